@@ -157,12 +157,9 @@ def transcribe(problem: Problem, *, fix_action: bool, ties_active: bool = False)
             constraints.add("fixed_action", (u[0] - action) if fix_action else ca.SX(0, 1), 0, 0)
         on = problem.active[i] & (soft | (i > 0) | (problem.on_inputs & (not fix_action)))
         held = [rows[j] if on[j] else ca.SX(-1) for j in range(soft.size)]
-        of_soft, of_hard = (
-            ca.vertcat(ca.SX(0, 1), *(held[j] for j in np.flatnonzero(which)))
-            for which in (soft, ~soft)
-        )
-        constraints.add("obstacles", of_soft - sigma[i], -np.inf, 0)
-        constraints.add("hard", of_hard, -np.inf, 0)
+        for j, k in zip(np.flatnonzero(soft), range(soft.size), strict=False):
+            held[j] -= sigma[i][k]
+        constraints.add("rows", ca.vertcat(ca.SX(0, 1), *held), -np.inf, 0)
 
     return Ocp(
         problem=problem,
@@ -178,7 +175,9 @@ def transcribe(problem: Problem, *, fix_action: bool, ties_active: bool = False)
         initial=constraints.where("initial")[0],
         fixed_action=constraints.where("fixed_action")[0],
         **{name: variables.where(name) for name in ("states", "inputs", "slacks")},
-        **{name: constraints.where(name) for name in ("dynamics", "obstacles", "hard")},
+        dynamics=constraints.where("dynamics"),
+        obstacles=constraints.where("rows")[:, soft],
+        hard=constraints.where("rows")[:, ~soft],
     )
 
 

@@ -159,7 +159,7 @@ class Loop:
         self._machine, self._nmpc, self._episode = machine, nmpc, code.episode
         self._given = (
             machine.code, slopes, *functions, *given[:5], kind, *given[5:],
-            machine.none, machine.drawn, machine.tolerance, place, nmpc.farthest, nmpc.largest,
+            machine.others, machine.drawn, machine.tolerance, place, nmpc.farthest, nmpc.largest,
             rule, moves.alpha, moves.beta or 0.0, np.full(d, least), np.full(d, most),
             learner.bootstrap is not nothing, trainer.constrained, trainer.clipped,
         )  # fmt: skip

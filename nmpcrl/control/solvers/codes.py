@@ -10,6 +10,7 @@ class Start(IntEnum):
     SHIFTED = 1  # an earlier solution, a stage later
     NEAR = 2  # an earlier solution as it is
     SAME = 3  # one in the same state, where only theta has moved
+    HELD = 4  # inputs that feedback finds and holds, where every stage stands at s before
 
 
 class End(IntEnum):

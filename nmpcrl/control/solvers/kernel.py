@@ -3,11 +3,14 @@
 The inputs are the variables and the states follow from them (single shooting). Each constraint
 h(x, u) <= sigma of a stage is a *row*: with slack s = sigma - h it adds W sigma - mu log sigma - mu
 log s to the objective, and its multiplier lam lies in (0, W). A hard row, or a bound of a state, is
-one whose W exceeds what its multiplier can be, and is no part of the value. Rows come in the order
-fixed ones, those of lines of data, sides of the states' box. A row of a stage is *planned* where
-the plan can change it, *settled* at stage 0 where it cannot, and else absent; what is not planned
-stands in the barrier as h = -1 and counts for nothing. From a start, one solve repeats the
-following while the barrier parameter mu falls:
+one whose W exceeds what its multiplier can be, and is no part of the value.
+
+Arrays of rows hold those of all stages one after the other, of a stage fixed rows, those of lines
+of data, and sides of the states' box. A row of a stage is *planned* where the plan can change it,
+*settled* at stage 0 where it cannot, and else absent. All but planned ones stand in the barrier as
+h = -1 and change nothing.
+
+From a start, one solve repeats the following while the barrier parameter mu falls:
 
 1. `measure` a plan: h, and for it the best sigma and s in closed form;
 2. `linearise`: from the last stage to the first, the costates p = L_x + A' p+ and the Hessian of
@@ -22,11 +25,12 @@ following while the barrier parameter mu falls:
 
 Sources: the recursion, Rawlings, Mayne and Diehl (2017), section 8.8; barrier, fraction to the
 boundary and inertia, Wächter and Biegler (2006); stage-wise elimination, Frison and Diehl (2020);
-the feedback, Tassa, Mansard and Todorov (2014).
+the feedback, Tassa, Mansard and Todorov (2014); a start with defects, Giftthaler et al. (2018).
 
 numba compiles this file beside a `model` generated from CasADi expressions, whose sizes are
-constants there. Everything is inlined and every buffer allocated inside `solve`: only then does
-the compiler know that no two of them overlap, which is worth 30 % of the time.
+constants there. Everything is inlined, and every buffer allocated in the function that is called:
+the compiler then knows all sizes. What allocates nothing is compiled without counting of references
+(`_nrt`), which takes a fifth of the time, and must not return an array.
 """
 
 import math
@@ -46,25 +50,17 @@ from .model import (
     SOFT,
     WIDTH,
     along_fixed,
-    along_fixed_end,
     along_line,
-    along_line_end,
     condense_fixed,
-    condense_fixed_end,
     condense_line,
-    condense_line_end,
     expand_fixed,
-    expand_fixed_end,
     expand_line,
-    expand_line_end,
     expand_stage,
     expand_terminal,
-    fixed_end_rows,
     fixed_rows,
     fixed_sizes,
     initial_cost,
     initial_theta,
-    line_end_rows,
     line_rows,
     line_sizes,
     stage_cost,
@@ -74,17 +70,15 @@ from .model import (
     terminal_size,
     terminal_theta,
     theta_fixed,
-    theta_fixed_end,
     theta_line,
-    theta_line_end,
     transition,
 )
 
 # numba takes plain numbers; a tuple below has one entry a start.
-COLD, SHIFTED, NEAR, SAME = map(int, Start)
+COLD, SHIFTED, NEAR, SAME, HELD = map(int, Start)
 SOLVED, STALLED, LIMIT, BROKEN, SADDLE = map(int, End)
-START_MU = (10.0, 1e-3, 1e-3, 1e-9)  # the barrier parameter
-PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
+START_MU = (10.0, 1e-3, 1e-3, 1e-9, 10.0)  # the barrier parameter
+PUSH = (1e-2, 1e-3, 1e-3, 1e-9, 1e-2)  # inside its bounds an input starts, in parts of their distance
 
 PLANNED, SETTLED = 1, 2  # kinds of rows, else absent
 STRICT = 1e4  # W of hard rows, scaled: an exact penalty, so that no state is infeasible
@@ -93,6 +87,8 @@ ABSURD = 1e9  # no plan goes through such a state
 GROWS = 3.0  # times the first state's distance from a plan: inputs leave it by more
 NOTICED = 0.1  # and by more than this part of its largest state
 WITHIN = 1.0 - 1e-5  # the most of its way to a bound that an input may go along the feedback
+CAUTIOUS = 0.99  # the same of a start
+CONVEX = 1e-3  # the first part of the largest curvature that makes the LQ problem of a start convex
 
 # The barrier's fall, Eqs. (7) and (8), and inertia, Algorithm IC, of Wächter and Biegler (2006);
 # their values in brackets. On 2,200 drawn problems a solve takes 11.5 iterations on average, 11.9
@@ -123,7 +119,8 @@ fast = {"contract", "arcp", "nsz", "reassoc", "afn"}  # not nnan, ninf: bad numb
 options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
 # To be called from machine code alone: a wrapper for Python takes a quarter of the compiling.
 inner: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inlined = njit(**inner, **options)
+allocating = njit(**inner, **options)
+inlined = njit(_nrt=False, **inner, **options)
 
 
 class Task(NamedTuple):
@@ -134,12 +131,14 @@ class Task(NamedTuple):
     lower: np.ndarray  # of an input, (NU,)
     upper: np.ndarray  # (NU,)
     sides: np.ndarray  # of the states' box: state, sign and limit, sign (x - limit) <= 0, (B, 3)
-    kind: np.ndarray  # of each row at each stage, (N + 1, rows)
-    begin: int  # the first stage with a planned row, 0 or 1
-    lines: int
+    kind: np.ndarray  # of the rows of each stage, (N + 1, rows)
+    planned: np.ndarray  # 1 or 0, (rows of all stages,)
     rate: np.ndarray  # scaled gamma^i, (N + 1,)
-    weights: np.ndarray  # W, (N + 1, rows)
+    weights: np.ndarray  # W, (rows of all stages,)
     first: int  # the first stage with a free input: 1 if u_0 is given, else 0
+    begin: int  # the first stage with a planned row, 0 or 1
+    rows: int  # of a stage
+    lines: int
 
 
 class Point(NamedTuple):
@@ -147,7 +146,7 @@ class Point(NamedTuple):
 
     x: np.ndarray  # (N + 1, NX)
     u: np.ndarray  # (N, NU)
-    h: np.ndarray  # (N + 1, rows), as all that follows
+    h: np.ndarray  # (rows of all stages,), as all that follows
     sigma: np.ndarray
     slack: np.ndarray
 
@@ -155,7 +154,7 @@ class Point(NamedTuple):
 class Duals(NamedTuple):
     """The multipliers of an iterate."""
 
-    lam: np.ndarray  # of the rows, in (0, W), (N + 1, rows)
+    lam: np.ndarray  # of the rows, in (0, W)
     below: np.ndarray  # of the inputs' lower bounds, (N, NU)
     above: np.ndarray  # (N, NU)
 
@@ -165,34 +164,43 @@ class Stages(NamedTuple):
 
     A: np.ndarray  # d x+ / d x, (N, NX, NX)
     B: np.ndarray  # d x+ / d u, (N, NX, NU)
-    hx: np.ndarray  # gradients of the rows but the sides, (N + 1, rows, NX)
-    hu: np.ndarray  # (N + 1, rows, NU)
+    hx: np.ndarray  # gradients of the rows but the sides, (rows of all stages, NX)
+    hu: np.ndarray  # (rows of all stages, NU)
     lx: np.ndarray  # of the objective, (N + 1, NX)
-    cu: np.ndarray  # (N + 1, NU)
-    lu: np.ndarray  # of the objective and lam' h, (N + 1, NU)
+    lu: np.ndarray  # of the objective, and from `condense` on of the bounds' barrier, (N + 1, NU)
+    px: np.ndarray  # of lam' h, (N + 1, NX)
+    pu: np.ndarray  # (N + 1, NU)
     p: np.ndarray  # costates, (N + 1, NX)
     Q: np.ndarray  # Hessian of the Lagrangian, (N + 1, NX, NX)
     S: np.ndarray  # (N + 1, NU, NX)
     R: np.ndarray  # (N + 1, NU, NU)
     q: np.ndarray  # Newton's right-hand side, (N + 1, NX)
     r: np.ndarray  # (N + 1, NU)
-    off: np.ndarray  # dlam = stiff (off + dh), (N + 1, rows)
+    off: np.ndarray  # dlam = stiff (off + dh), (rows of all stages,)
     stiff: np.ndarray
-    held: np.ndarray  # of one stage: lam of what is planned, (rows,)
-    firm: np.ndarray  # stiff
-    pull: np.ndarray  # lam + off stiff
+    held: np.ndarray  # lam of planned rows, 0 of others
+    firm: np.ndarray  # stiff, likewise
+    pull: np.ndarray  # lam + off stiff, likewise
 
 
 class Step(NamedTuple):
-    """A Newton step, and the feedback u = k + K x that makes it."""
+    """A Newton step, the feedback u = k + K x that makes it, and the recursion's intermediates."""
 
     K: np.ndarray  # (N, NU, NX)
     k: np.ndarray  # (N, NU)
     x: np.ndarray  # (N + 1, NX)
     u: np.ndarray  # (N, NU)
-    lam: np.ndarray  # (N + 1, rows)
+    lam: np.ndarray  # (rows of all stages,)
     below: np.ndarray
     above: np.ndarray
+    V: np.ndarray  # of the cost to go, (NX, NX)
+    v: np.ndarray  # (NX,)
+    w: np.ndarray  # (NX,)
+    VA: np.ndarray  # (NX, NX)
+    VB: np.ndarray  # (NX, NU)
+    L: np.ndarray  # (NU, NU)
+    F: np.ndarray  # (NU, NX)
+    f: np.ndarray  # (NU,)
 
 
 @inlined
@@ -205,82 +213,63 @@ def roll(task, point):
 @inlined
 def measure(task, point, mu):
     """Step 1: the objective and the barrier function of a plan."""
-    x, u, last, begin = point.x, point.u, len(point.u), task.begin
-    objective = 0.0
+    x, u, h, last = point.x, point.u, point.h, len(point.u)
+    objective = task.rate[last] * terminal_cost(x[last], task.theta, task.data[last])
     for i in range(last):
         objective += task.rate[i] * stage_cost(x[i], u[i], task.theta, task.data[i])
-    objective += task.rate[last] * terminal_cost(x[last], task.theta, task.data[last])
-    for i in range(begin, last):
-        fixed_rows(x[i], u[i], task.theta, task.data[i], point.h[i])
-        for line in range(task.lines):
-            line_rows(
-                x[i], u[i], task.theta, task.data[i], task.data[i], point.h[i],
-                OWN + WIDTH * line, FIXED + PER * line,
-            )  # fmt: skip
-        sides_of(task, x[i], point.h[i])
-    rows_of_end(task, point, point.h[last])
-    for i in range(begin, last + 1):
-        for j in range(point.h.shape[1]):
-            if task.kind[i, j] != PLANNED:
-                point.h[i, j] = -1.0
-    centre(
-        point.h[begin:].ravel(), task.weights[begin:].ravel(), mu,
-        point.sigma[begin:].ravel(), point.slack[begin:].ravel(),
-    )  # fmt: skip
+    for i in range(task.begin, last + 1):
+        rows_of(task, x, u, i, h)
+    for t in range(task.begin * task.rows, len(h)):
+        h[t] = h[t] if task.planned[t] > 0.0 else -1.0
+    centre(task, point, mu)
     return objective, objective + barrier(task, point, mu)
 
 
 @inlined
-def rows_of_end(task, point, h):
-    """h of every row of stage N, planned or not."""
-    last = len(point.u)
-    fixed_end_rows(point.x[last], point.u[last - 1], task.theta, task.data[last], h)
+def rows_of(task, x, u, i, h):
+    """h of every row of a stage, planned or not."""
+    t, last = task.rows * i, len(u)
+    fixed_rows(x[i], u[min(i, last - 1)], task.theta, task.data[i], h, t)
+    t += FIXED
     for line in range(task.lines):
-        line_end_rows(
-            point.x[last], point.u[last - 1], task.theta, task.data[last], task.data[last], h,
-            OWN + WIDTH * line, FIXED + PER * line,
+        line_rows(
+            x[i], u[min(i, last - 1)], task.theta, task.data[i], task.data[i], h,
+            OWN + WIDTH * line, t,
         )  # fmt: skip
-    sides_of(task, point.x[last], h)
-
-
-@inlined
-def sides_of(task, x, h):
-    """h of the sides of the states' box."""
-    first = FIXED + PER * task.lines
+        t += PER
     for j in range(len(task.sides)):
-        h[first + j] = task.sides[j, 1] * (x[int(task.sides[j, 0])] - task.sides[j, 2])
+        h[t + j] = task.sides[j, 1] * (x[i, int(task.sides[j, 0])] - task.sides[j, 2])
 
 
 @inlined
-def centre(h, weights, mu, sigma, slack):
+def centre(task, point, mu):
     """The sigma and slack that minimise each row's barrier while h = sigma - slack is given.
 
     With k = |h| W / mu they are mu / W times (2 + k + sqrt(k^2 + 4)) / 2 and its conjugate.
     """
-    for t in range(h.size):
+    h, weights = point.h, task.weights
+    for t in range(task.begin * task.rows, len(h)):
         unit = mu / weights[t]
         k = abs(h[t]) / unit
         twice = 2.0 + k + math.sqrt(k * k + 4.0)
         large, small = 0.5 * unit * twice, unit * twice / (twice - 2.0)
-        sigma[t] = large if h[t] > 0.0 else small
-        slack[t] = small if h[t] > 0.0 else large
+        point.sigma[t] = large if h[t] > 0.0 else small
+        point.slack[t] = small if h[t] > 0.0 else large
 
 
 @inlined
 def barrier(task, point, mu):
     """What the rows and the inputs' bounds add to the objective."""
     u, sigma, slack = point.u, point.sigma, point.slack
-    total, logs = 0.0, 0.0
-    for i in range(task.begin, len(sigma)):
-        product = 1.0  # one logarithm serves eight rows, in units in which it cannot overflow
-        for j in range(sigma.shape[1]):
-            total += task.weights[i, j] * sigma[i, j]
-            unit = task.weights[i, j] / mu
-            product *= (unit * sigma[i, j]) * (unit * slack[i, j])
-            if j % 8 == 7:
-                logs += math.log(product)
-                product = 1.0
-        logs += math.log(product)
+    total, logs, product = 0.0, 0.0, 1.0
+    for t in range(task.begin * task.rows, len(sigma)):
+        total += task.weights[t] * sigma[t]
+        unit = task.weights[t] / mu  # in such units a product cannot overflow
+        product *= (unit * sigma[t]) * (unit * slack[t])
+        if t % 8 == 7:  # one logarithm serves eight rows
+            logs += math.log(product)
+            product = 1.0
+    logs += math.log(product)
     for i in range(task.first, len(u)):
         for a in range(NU):
             logs += math.log((u[i, a] - task.lower[a]) * (task.upper[a] - u[i, a]))
@@ -288,72 +277,67 @@ def barrier(task, point, mu):
 
 
 @inlined
-def hold(task, duals, i, held):
-    """The multipliers of the planned rows of a stage, 0 for the others."""
-    for j in range(len(held)):
-        held[j] = duals.lam[i, j] if task.kind[i, j] == PLANNED else 0.0
-
-
-@inlined
 def linearise(task, point, duals, stages):
     """Step 2: derivatives of every stage, from the last to the first."""
     x, u, p, last = point.x, point.u, stages.p, len(point.u)
-    held, px, pu = stages.held, np.zeros(NX), np.zeros(NU)
-    first = FIXED + PER * task.lines
+    for t in range(task.begin * task.rows, len(point.h)):
+        stages.held[t] = duals.lam[t] if task.planned[t] > 0.0 else 0.0
+    clear(stages)
+    for i in range(task.begin, last + 1):
+        expand_rows(task, x, u, i, stages)
     expand_terminal(
         x[last], task.theta, task.data[last], task.rate[last:], stages.lx[last], stages.Q[last]
     )
-    hold(task, duals, last, held)
-    expand_fixed_end(
-        x[last], u[last - 1], task.theta, task.data[last], held,
-        px, pu, stages.Q[last], stages.S[last], stages.R[last], stages.hx[last], stages.hu[last],
-        px, pu, stages.Q[last], stages.S[last], stages.R[last],
-    )  # fmt: skip
-    for line in range(task.lines):
-        expand_line_end(
-            x[last], u[last - 1], task.theta, task.data[last], task.data[last], held,
-            px, pu, stages.Q[last], stages.S[last], stages.R[last],
-            stages.hx[last], stages.hu[last],
-            px, pu, stages.Q[last], stages.S[last], stages.R[last],
-            OWN + WIDTH * line, FIXED + PER * line,
-        )  # fmt: skip
-    for j in range(len(task.sides)):
-        px[int(task.sides[j, 0])] += held[first + j] * task.sides[j, 1]
     for a in range(NX):
-        p[last, a] = stages.lx[last, a] + px[a]
+        p[last, a] = stages.lx[last, a] + stages.px[last, a]
+        stages.px[0, a] = 0.0  # x_0 is given
     for i in range(last - 1, -1, -1):
         expand_stage(
-            x[i], u[i], task.theta, task.data[i], task.rate[i : i + 1], p[i + 1],
-            stages.A[i], stages.B[i], stages.lx[i], stages.cu[i],
+            x[i], u[i], task.theta, task.data[i], task.rate[i:], p[i + 1],
+            stages.A[i], stages.B[i], stages.lx[i], stages.lu[i],
             stages.Q[i], stages.S[i], stages.R[i],
         )  # fmt: skip
         for a in range(NX):
-            px[a] = 0.0
-        for a in range(NU):
-            pu[a] = 0.0
-        if i >= task.begin:
-            hold(task, duals, i, held)
-            expand_fixed(
-                x[i], u[i], task.theta, task.data[i], held,
-                px, pu, stages.Q[i], stages.S[i], stages.R[i], stages.hx[i], stages.hu[i],
-                px, pu, stages.Q[i], stages.S[i], stages.R[i],
-            )  # fmt: skip
-            for line in range(task.lines):
-                expand_line(
-                    x[i], u[i], task.theta, task.data[i], task.data[i], held,
-                    px, pu, stages.Q[i], stages.S[i], stages.R[i], stages.hx[i], stages.hu[i],
-                    px, pu, stages.Q[i], stages.S[i], stages.R[i],
-                    OWN + WIDTH * line, FIXED + PER * line,
-                )  # fmt: skip
-            for j in range(len(task.sides)):
-                px[int(task.sides[j, 0])] += held[first + j] * task.sides[j, 1]
-        for a in range(NX):
-            total = stages.lx[i, a] + (px[a] if i > 0 else 0.0)  # x_0 is given
+            total = stages.lx[i, a] + stages.px[i, a]
             for b in range(NX):
                 total += stages.A[i, b, a] * p[i + 1, b]
             p[i, a] = total
+
+
+@inlined
+def clear(stages):
+    """Zeros where the functions of `model` add."""
+    for i in range(len(stages.px)):
+        for a in range(NX):
+            stages.px[i, a] = 0.0
+            for b in range(NX):
+                stages.Q[i, a, b] = 0.0
         for a in range(NU):
-            stages.lu[i, a] = stages.cu[i, a] + pu[a]
+            stages.pu[i, a] = 0.0
+            for b in range(NX):
+                stages.S[i, a, b] = 0.0
+            for b in range(NU):
+                stages.R[i, a, b] = 0.0
+
+
+@inlined
+def expand_rows(task, x, u, i, stages):
+    """Gradients of a stage's rows, and what held' h adds to the Lagrangian's derivatives."""
+    t, last, held = task.rows * i, len(u), stages.held
+    expand_fixed(
+        x[i], u[min(i, last - 1)], task.theta, task.data[i], held, stages.hx, stages.hu,
+        stages.px[i], stages.pu[i], stages.Q[i], stages.S[i], stages.R[i], t,
+    )  # fmt: skip
+    t += FIXED
+    for line in range(task.lines):
+        expand_line(
+            x[i], u[min(i, last - 1)], task.theta, task.data[i], task.data[i], held,
+            stages.hx, stages.hu, stages.px[i], stages.pu[i],
+            stages.Q[i], stages.S[i], stages.R[i], OWN + WIDTH * line, t,
+        )  # fmt: skip
+        t += PER
+    for j in range(len(task.sides)):
+        stages.px[i, int(task.sides[j, 0])] += held[t + j] * task.sides[j, 1]
 
 
 @inlined
@@ -374,95 +358,75 @@ def residuals(task, point, duals, stages, mu):
             high = duals.above[i, a] * (task.upper[a] - point.u[i, a]) - mu
             stationarity += gradient * gradient
             complementarity += low * low + high * high
-    complementarity += row_residuals(
-        duals.lam[task.begin :].ravel(), task.weights[task.begin :].ravel(),
-        point.sigma[task.begin :].ravel(), point.slack[task.begin :].ravel(), mu,
-    )
+    lam, weights, sigma, slack = duals.lam, task.weights, point.sigma, point.slack
+    for t in range(task.begin * task.rows, len(lam)):  # lam slack = mu = (W - lam) sigma
+        low, high = lam[t] * slack[t] - mu, (weights[t] - lam[t]) * sigma[t] - mu
+        if lam[t] >= ALMOST * weights[t]:
+            high = 0.0
+        complementarity += low * low + high * high
     return math.sqrt(stationarity), math.sqrt(complementarity), largest
 
 
 @inlined
 def input_gradient(stages, i, a):
-    """The Lagrangian's derivative in input a of stage i, but for the bounds."""
-    gradient = stages.lu[i, a]
+    """The Lagrangian's derivative in input a of stage i, but for the bounds; before `condense`."""
+    gradient = stages.lu[i, a] + stages.pu[i, a]
     for b in range(NX):
         gradient += stages.B[i, b, a] * stages.p[i + 1, b]
     return gradient
 
 
 @inlined
-def row_residuals(lam, weights, sigma, slack, mu):
-    """Squared violation of lam slack = mu = (W - lam) sigma."""
-    total = 0.0
-    for t in range(lam.size):
-        low, high = lam[t] * slack[t] - mu, (weights[t] - lam[t]) * sigma[t] - mu
-        if lam[t] >= ALMOST * weights[t]:
-            high = 0.0
-        total += low * low + high * high
-    return total
-
-
-@inlined
 def condense(task, point, duals, stages, mu):
     """Step 4: Newton's system without rows and bounds: q and r, and Q, S and R in place."""
-    begin, last, first = task.begin, len(point.u), FIXED + PER * task.lines
-    soften(
-        point.h[begin:].ravel(), point.sigma[begin:].ravel(), point.slack[begin:].ravel(),
-        duals.lam[begin:].ravel(), task.weights[begin:].ravel(), mu,
-        stages.off[begin:].ravel(), stages.stiff[begin:].ravel(),
-    )  # fmt: skip
-    stiff, pull, hx, hu = stages.firm, stages.pull, stages.hx, stages.hu
-    q, r, Q, S, R = stages.q, stages.r, stages.Q, stages.S, stages.R
-    for i in range(last):
-        for a in range(NX):
-            q[i, a] = stages.lx[i, a]
-        for a in range(NU):
-            r[i, a] = stages.cu[i, a]
-    for a in range(NX):
-        q[last, a] = stages.lx[last, a]
-    for i in range(begin, last + 1):
-        for j in range(len(stiff)):
-            planned = task.kind[i, j] == PLANNED
-            stiff[j] = stages.stiff[i, j] if planned else 0.0
-            pull[j] = duals.lam[i, j] + stages.off[i, j] * stiff[j] if planned else 0.0
-        for j in range(len(task.sides)):
-            a = int(task.sides[j, 0])
-            q[i, a] += pull[first + j] * task.sides[j, 1]
-            Q[i, a, a] += stiff[first + j]
-        if i == last:
-            break
-        condense_fixed(
-            stiff, pull, hx[i], hu[i], q[i], r[i], Q[i], S[i], R[i], q[i], r[i], Q[i], S[i], R[i]
-        )
-        for line in range(task.lines):
-            condense_line(
-                stiff, pull, hx[i], hu[i], q[i], r[i], Q[i], S[i], R[i],
-                q[i], r[i], Q[i], S[i], R[i], 0, FIXED + PER * line,
-            )  # fmt: skip
-    condense_fixed_end(
-        stiff, pull, hx[last], hu[last], q[last], r[last], Q[last], S[last], R[last],
-        q[last], r[last], Q[last], S[last], R[last],
-    )  # fmt: skip
-    for line in range(task.lines):
-        condense_line_end(
-            stiff, pull, hx[last], hu[last], q[last], r[last], Q[last], S[last], R[last],
-            q[last], r[last], Q[last], S[last], R[last], 0, FIXED + PER * line,
-        )  # fmt: skip
+    soften(task, point, duals, stages, mu)
+    q, r, Q, S, R, last = stages.q, stages.r, stages.Q, stages.S, stages.R, len(point.u)
     for i in range(task.first, last):
         for a in range(NU):
             low, high = 1.0 / (point.u[i, a] - task.lower[a]), 1.0 / (task.upper[a] - point.u[i, a])
-            r[i, a] += mu * high - mu * low
+            stages.lu[i, a] += mu * high - mu * low
             R[i, a, a] += duals.below[i, a] * low + duals.above[i, a] * high
+    begin_sides(stages)
+    for i in range(task.begin, last + 1):
+        t = task.rows * i
+        condense_fixed(
+            stages.firm, stages.pull, stages.hx, stages.hu, q[i], r[i], Q[i], S[i], R[i], t
+        )
+        t += FIXED
+        for _ in range(task.lines):
+            condense_line(
+                stages.firm, stages.pull, stages.hx, stages.hu, q[i], r[i], Q[i], S[i], R[i], t
+            )
+            t += PER
+        for j in range(len(task.sides)):
+            a = int(task.sides[j, 0])
+            q[i, a] += stages.pull[t + j] * task.sides[j, 1]
+            Q[i, a, a] += stages.firm[t + j]
 
 
 @inlined
-def soften(h, sigma, slack, lam, weights, mu, off, stiff):
+def soften(task, point, duals, stages, mu):
     """Eliminate the rows: Newton on lam slack = mu = (W - lam) sigma with h = sigma - slack."""
-    for t in range(h.size):
+    lam, weights = duals.lam, task.weights
+    for t in range(task.begin * task.rows, len(lam)):
         rest = weights[t] - lam[t]
         both = lam[t] * rest
-        off[t] = h[t] + mu * (rest - lam[t]) / both
-        stiff[t] = both / (slack[t] * rest + sigma[t] * lam[t])
+        off = point.h[t] + mu * (rest - lam[t]) / both
+        stiff = both / (point.slack[t] * rest + point.sigma[t] * lam[t])
+        stages.off[t] = off
+        stages.stiff[t] = stiff
+        stages.firm[t] = stiff if task.planned[t] > 0.0 else 0.0
+        stages.pull[t] = lam[t] + off * stiff if task.planned[t] > 0.0 else 0.0
+
+
+@inlined
+def begin_sides(stages):
+    """q and r of the objective alone."""
+    for i in range(len(stages.q)):
+        for a in range(NX):
+            stages.q[i, a] = stages.lx[i, a]
+        for a in range(NU):
+            stages.r[i, a] = stages.lu[i, a]
 
 
 @inlined
@@ -470,9 +434,7 @@ def factorise(stages, delta, first, step):
     """Step 5: the Riccati recursion; false where Q_uu + delta I is not positive definite."""
     A, B, r, S, R = stages.A, stages.B, stages.r, stages.S, stages.R
     last = len(A)
-    V, v, w = np.empty((NX, NX)), np.empty(NX), np.empty(NX)  # of the cost to go
-    VA, VB = np.empty((NX, NX)), np.empty((NX, NU))
-    L, F, f = np.empty((NU, NU)), np.empty((NU, NX)), np.empty(NU)
+    V, v, w, VA, VB, L, F, f = step.V, step.v, step.w, step.VA, step.VB, step.L, step.F, step.f
     for a in range(NX):
         v[a] = stages.q[last, a]
         for b in range(NX):
@@ -563,6 +525,94 @@ def feedback(L, F, f, K, k):
 
 
 @inlined
+def convex(stages, first, step, size):
+    """`factorise` an LQ problem; where it is not convex, delta I is added to its Q and R."""
+    added = 0.0
+    while not factorise(stages, 0.0, first, step) and added < DELTA_LARGEST * size:
+        more = max(CONVEX * size, DELTA_GROWS * added) - added
+        added += more
+        for i in range(len(stages.Q)):
+            for a in range(NX):
+                stages.Q[i, a, a] += more
+            for a in range(NU):
+                stages.R[i, a, a] += more
+
+
+@inlined
+def drifting(task, stages, step, drift, steer):
+    """Take up defects f, in `drift` from stage 1 on: states and inputs that move by feedback alone.
+
+    They replace the defects; q and r receive what the move adds, so that `factorise` and `sweep`
+    find the rest of the step. An unstable model would carry defects away that were rolled out.
+    """
+    last = len(step.u)
+    for a in range(NX):
+        drift[0, a] = 0.0
+    for i in range(last + 1):
+        for a in range(NU if i < last else 0):
+            steer[i, a] = 0.0
+            for b in range(NX if i >= task.first else 0):
+                steer[i, a] += step.K[i, a, b] * drift[i, b]
+        for a in range(NX if i < last else 0):
+            for b in range(NX):
+                drift[i + 1, a] += stages.A[i, a, b] * drift[i, b]
+            for b in range(NU):
+                drift[i + 1, a] += stages.B[i, a, b] * steer[i, b]
+        for a in range(NX):
+            for b in range(NX):
+                stages.q[i, a] += stages.Q[i, a, b] * drift[i, b]
+            for b in range(NU if i < last else 0):
+                stages.q[i, a] += stages.S[i, b, a] * steer[i, b]
+        for a in range(NU if i < last else 0):
+            for b in range(NX):
+                stages.r[i, a] += stages.S[i, a, b] * drift[i, b]
+            for b in range(NU):
+                stages.r[i, a] += stages.R[i, a, b] * steer[i, b]
+
+
+@inlined
+def regulate(task, plan, stages, step, point):
+    """Inputs for a model that falls over at rest: the plan of one LQ problem, held by its feedback.
+
+    The problem is linearised where every stage stands still at s. That is no plan, so its sweep
+    closes the defects f(s, u) - s; the model is then rolled out under u + k + K (x - s).
+    """
+    x, u, drift, last, size = plan.x, plan.u, step.x, len(plan.u), 0.0
+    clear(stages)
+    for i in range(last + 1):
+        for a in range(NX):
+            x[i, a] = point.x[0, a]
+            stages.p[i, a] = 0.0
+        for a in range(NU if i < last else 0):
+            u[i, a] = point.u[i, a]
+    expand_terminal(
+        x[last], task.theta, task.data[last], task.rate[last:], stages.lx[last], stages.Q[last]
+    )
+    for i in range(last):
+        expand_stage(
+            x[i], u[i], task.theta, task.data[i], task.rate[i:], stages.p[i + 1],
+            stages.A[i], stages.B[i], stages.lx[i], stages.lu[i],
+            stages.Q[i], stages.S[i], stages.R[i],
+        )  # fmt: skip
+        transition(x[i], u[i], task.theta, task.data[i], drift[i + 1])
+        for a in range(NX):
+            drift[i + 1, a] -= x[i, a]
+            size = max(size, abs(stages.Q[i, a, a]), abs(stages.Q[last, a, a]))
+        for a in range(NU):
+            size = max(size, abs(stages.R[i, a, a]))
+    begin_sides(stages)
+    convex(stages, task.first, step, size)
+    drifting(task, stages, step, drift, step.u)
+    factorise(stages, 0.0, task.first, step)
+    for i in range(last):
+        for a in range(NX):
+            x[i, a] += drift[i, a]
+        for a in range(NU):
+            step.k[i, a] += step.u[i, a]
+    follow(task, plan, step, 1.0, CAUTIOUS, point)
+
+
+@inlined
 def newton_step(task, point, duals, stages, mu, step):
     """Step 6: the step; the primal and the dual length that stay inside bounds; the descent."""
     sweep(task, stages, step)
@@ -571,11 +621,7 @@ def newton_step(task, point, duals, stages, mu, step):
     scale_rows(task, stages, step)
     tau = max(TAU_MIN, 1.0 - max(mu, TAU_REST))
     primal, dual = bounds_along(task, point, duals, mu, step, tau)
-    inside = inside_rows(
-        duals.lam[task.begin :].ravel(), step.lam[task.begin :].ravel(),
-        task.weights[task.begin :].ravel(), tau,
-    )  # fmt: skip
-    return primal, min(dual, inside), derivative
+    return primal, min(dual, inside_rows(task, duals, step, tau)), derivative
 
 
 @inlined
@@ -601,46 +647,34 @@ def sweep(task, stages, step):
 
 @inlined
 def rows_along(task, stages, step):
-    """dh of every planned row, in the place of its multiplier's step."""
-    last, first, dh = len(step.u), FIXED + PER * task.lines, step.lam
-    for i in range(task.begin, last):
-        along_fixed(stages.hx[i], stages.hu[i], step.x[i], step.u[i], dh[i])
-        for line in range(task.lines):
-            along_line(
-                stages.hx[i], stages.hu[i], step.x[i], step.u[i], dh[i], 0, FIXED + PER * line
-            )
-    along_fixed_end(stages.hx[last], stages.hu[last], step.x[last], step.u[last - 1], dh[last])
-    for line in range(task.lines):
-        along_line_end(
-            stages.hx[last], stages.hu[last], step.x[last], step.u[last - 1], dh[last], 0,
-            FIXED + PER * line,
-        )  # fmt: skip
+    """dh of every row, in the place of its multiplier's step."""
+    last, dh = len(step.u), step.lam
     for i in range(task.begin, last + 1):
+        t = task.rows * i
+        along_fixed(stages.hx, stages.hu, step.x[i], step.u[min(i, last - 1)], dh, t)
+        t += FIXED
+        for _ in range(task.lines):
+            along_line(stages.hx, stages.hu, step.x[i], step.u[min(i, last - 1)], dh, t)
+            t += PER
         for j in range(len(task.sides)):
-            dh[i, first + j] = task.sides[j, 1] * step.x[i, int(task.sides[j, 0])]
-        for j in range(dh.shape[1]):
-            if task.kind[i, j] != PLANNED:
-                dh[i, j] = 0.0
+            dh[t + j] = task.sides[j, 1] * step.x[i, int(task.sides[j, 0])]
+    for t in range(task.begin * task.rows, len(dh)):
+        dh[t] = dh[t] if task.planned[t] > 0.0 else 0.0
 
 
 @inlined
 def scale_rows(task, stages, step):
     """dlam of every row, in the place of dh."""
-    dlam, off, stiff = (
-        step.lam[task.begin :].ravel(),
-        stages.off[task.begin :].ravel(),
-        stages.stiff[task.begin :].ravel(),
-    )
-    for t in range(dlam.size):
-        dlam[t] = stiff[t] * (off[t] + dlam[t])
+    for t in range(task.begin * task.rows, len(step.lam)):
+        step.lam[t] = stages.stiff[t] * (stages.off[t] + step.lam[t])
 
 
 @inlined
-def inside_rows(lam, dlam, weights, tau):
+def inside_rows(task, duals, step, tau):
     """The largest step up to 1 that leaves every lam the share 1 - tau of its way to 0 or W."""
-    worst = tau
-    for t in range(lam.size):
-        ratio = abs(dlam[t]) / (lam[t] if dlam[t] < 0.0 else weights[t] - lam[t])
+    lam, dlam, worst = duals.lam, step.lam, tau
+    for t in range(task.begin * task.rows, len(lam)):
+        ratio = abs(dlam[t]) / (lam[t] if dlam[t] < 0.0 else task.weights[t] - lam[t])
         worst = ratio if ratio > worst else worst
     return tau / worst
 
@@ -678,17 +712,18 @@ def descent(task, point, stages, mu, step):
             total += stages.lx[i, a] * step.x[i, a]
     for i in range(task.first, len(step.u)):
         for a in range(NU):
-            low, high = point.u[i, a] - task.lower[a], task.upper[a] - point.u[i, a]
-            total += (stages.cu[i, a] - mu / low + mu / high) * step.u[i, a]
-    for i in range(task.begin, len(step.lam)):
-        for j in range(step.lam.shape[1]):
-            total += mu / point.slack[i, j] * step.lam[i, j]
+            total += stages.lu[i, a] * step.u[i, a]
+    for t in range(task.begin * task.rows, len(step.lam)):
+        total += mu / point.slack[t] * step.lam[t]
     return total
 
 
 @inlined
-def follow(task, plan, step, length, point):
-    """Roll out u + length k + K (x - plan) from point.x[0], inside the inputs' bounds."""
+def follow(task, plan, step, length, most, point):
+    """Roll out u + length k + K (x - plan) from point.x[0].
+
+    An input goes at most the part `most` of the way to its bounds.
+    """
     for i in range(len(plan.u)):
         for a in range(NU):
             move = 0.0
@@ -697,7 +732,7 @@ def follow(task, plan, step, length, point):
                 for b in range(NX):
                     move += step.K[i, a, b] * (point.x[i, b] - plan.x[i, b])
             low, high = plan.u[i, a] - task.lower[a], task.upper[a] - plan.u[i, a]
-            point.u[i, a] = plan.u[i, a] + min(max(move, -WITHIN * low), WITHIN * high)
+            point.u[i, a] = plan.u[i, a] + min(max(move, -most * low), most * high)
         transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
 
 
@@ -705,7 +740,7 @@ def follow(task, plan, step, length, point):
 def search(task, point, trial, mu, step, length, total, derivative):
     """Step 7: put into `trial` what lowers the barrier function; it and the objective, or nan."""
     while length > SHORTEST:
-        follow(task, point, step, length, trial)
+        follow(task, point, step, length, WITHIN, trial)
         objective, reached = measure(task, trial, mu)
         if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
             return objective, reached
@@ -720,16 +755,14 @@ def advance(task, duals, step, length):
         for a in range(NU):
             duals.below[i, a] += length * step.below[i, a]
             duals.above[i, a] += length * step.above[i, a]
-    for i in range(task.begin, len(duals.lam)):
-        for j in range(duals.lam.shape[1]):
-            most = ALMOST * task.weights[i, j]
-            duals.lam[i, j] = min(duals.lam[i, j] + length * step.lam[i, j], most)
+    for t in range(task.begin * task.rows, len(duals.lam)):
+        most = ALMOST * task.weights[t]
+        duals.lam[t] = min(duals.lam[t] + length * step.lam[t], most)
 
 
-@inlined
-def lines_of(data):
-    """The number of lines of data that have rows of their own."""
-    return (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
+# Solutions are the vectors of `Ocp`: z has x_i, u_i and sigma_i of every stage, g the dynamics to
+# x_{i+1} and the rows but the sides, and behind the first dynamics x_0 = s and u_0 = a. A solution
+# is z, the multipliers of g, those of the bounds of z, and the gradient.
 
 
 @inlined
@@ -739,40 +772,35 @@ def slacks_of(task):
 
 
 @inlined
-def offsets(task, stage):
-    """Where the variables and the constraints of a stage begin in the vectors of `Ocp`."""
-    slacks, later = slacks_of(task), min(stage, 1)
-    constraints = stage * (NX + slacks + FIXED - SOFT) + later * (NX + task.first * NU)
-    return stage * (NX + NU + slacks), constraints
+def place(task, i):
+    """Where x_i stands in a solution, and the multipliers of the rows of stage i."""
+    last, slacks, rows = len(task.rate) - 1, slacks_of(task), FIXED + PER * task.lines
+    variables = last * (NX + NU + slacks) + NX + slacks
+    of_rows = NX + task.first * NU + i * (NX + rows) + (NX if i < last else 0)
+    return i * (NX + NU + slacks), variables + of_rows
 
 
 @inlined
-def place_of_rows(task, stage, last):
-    """Where the rows of a stage begin among the constraints of `Ocp`."""
-    constraints = offsets(task, stage)[1] + (NX if stage < last else 0)
-    return constraints + (NX + task.first * NU if stage == 0 else 0)
+def bounds_place(task):
+    """How far behind a variable the multiplier of its bound stands, and where all of these end."""
+    z, g = place(task, len(task.rate) - 1)
+    bounds = g + FIXED + PER * task.lines
+    return bounds, bounds + z + NX + slacks_of(task)
 
 
 @inlined
-def place_of_row(task, j):
-    """Where row j is among those of its stage in `Ocp`: soft ones first, then hard ones."""
-    if j < SOFT:
-        return j
-    return slacks_of(task) + j - SOFT if j < FIXED else SOFT + j - FIXED
-
-
-@inlined
-def begin_inputs(task, point, state, action, start, warm_start):
-    """The inputs of the warm start, inside their bounds."""
+def begin_inputs(task, point, state, action, start, inputs, warm_start):
+    """The inputs of a start, inside their bounds."""
     last, ahead = len(point.u), 1 if start == SHIFTED else 0
     for a in range(NX):
         point.x[0, a] = state[a]
     for i in range(last):
-        at = offsets(task, min(i + ahead, last - 1))[0] + NX
+        z = place(task, min(i + ahead, last - 1))[0]
         for a in range(NU):
             low, high = task.lower[a], task.upper[a]
             push = PUSH[start] * min(1.0, high - low)
-            point.u[i, a] = min(max(warm_start[at + a], low + push), high - push)
+            u = inputs[i, a] if start == COLD or start == HELD else warm_start[z + NX + a]
+            point.u[i, a] = min(max(u, low + push), high - push)
             if i < task.first:
                 point.u[i, a] = action[a]
 
@@ -786,9 +814,9 @@ def recall(task, start, warm_start, point, plan):
     last, ahead = len(point.u), 1 if start == SHIFTED else 0
     apart, farthest, largest = 0.0, 0.0, 0.0
     for i in range(last + 1):
-        at = offsets(task, min(i + ahead, last))[0]
+        z = place(task, min(i + ahead, last))[0]
         for a in range(NX):
-            plan.x[i, a] = warm_start[at + a]
+            plan.x[i, a] = warm_start[z + a]
             largest = max(largest, abs(plan.x[i, a]))
             away = abs(point.x[i, a] - plan.x[i, a])
             if i == 0:
@@ -800,26 +828,31 @@ def recall(task, start, warm_start, point, plan):
     return not farthest <= max(GROWS * apart, NOTICED * largest)
 
 
+@allocating
+def described(theta, data, lower, upper, sides, kind, discount, weights, first):
+    """The problem before `scale`."""
+    stages, rows = len(discount), len(weights) + len(sides)
+    planned, begin = np.empty(stages * rows), 1
+    for i in range(stages):
+        for j in range(rows):
+            planned[i * rows + j] = 1.0 if kind[i, j] == PLANNED else 0.0
+            if i == 0 and kind[0, j] == PLANNED:
+                begin = 0
+    lines = (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
+    return Task(
+        theta, data, lower, upper, sides, kind, planned, discount.copy(),
+        np.empty(stages * rows), first, begin, rows, lines,
+    )  # fmt: skip
+
+
 @inlined
-def scaled(
-    theta, data, lower, upper, sides, kind, discount, weights, first, point, state, action, start,
-    warm_start,
-):  # fmt: skip
-    """The problem divided by the size of its costs along the plan of a start, and that size."""
-    last, rows = len(discount) - 1, len(weights) + len(sides)
-    scaled_weights, begin = np.empty((last + 1, rows)), 1
-    for j in range(rows):
-        if kind[0, j] == PLANNED:
-            begin = 0
-    rate = discount.copy()
-    task = Task(
-        theta, data, lower, upper, sides, kind, begin, lines_of(data), rate, scaled_weights, first
-    )
-    begin_inputs(task, point, state, action, start, warm_start)
-    roll(task, point)
-    factor = discount[last] * terminal_size(point.x[last], theta, data[last])
+def scale(task, point, weights):
+    """Divide the problem by the size of its costs along the plan of a start, which is returned."""
+    last, rate = len(point.u), task.rate
+    factor = rate[last] * terminal_size(point.x[last], task.theta, task.data[last])
     for i in range(last):
-        factor = max(factor, discount[i] * stage_size(point.x[i], point.u[i], theta, data[i]))
+        size = stage_size(point.x[i], point.u[i], task.theta, task.data[i])
+        factor = max(factor, rate[i] * size)
     if not 0.0 < factor < np.inf:
         factor = 1.0
     strict = STRICT
@@ -827,40 +860,37 @@ def scaled(
         if weights[j] < np.inf:
             strict = max(strict, STRICT_TO_SOFT * weights[j] / factor)
     for i in range(last + 1):
-        rate[i] = discount[i] / factor
-        for j in range(rows):
+        rate[i] /= factor
+        for j in range(task.rows):
             soft = j < len(weights) and weights[j] < np.inf
-            scaled_weights[i, j] = weights[j] * rate[i] if soft else strict
-    return task, factor
+            task.weights[i * task.rows + j] = weights[j] * rate[i] if soft else strict
+    return factor
 
 
 @inlined
 def begin_multipliers(task, point, duals, start, mu, factor, warm_start):
     """The bounds' multipliers: the warm start's, or central ones where these are larger."""
     last, ahead = len(point.u), 1 if start == SHIFTED else 0
-    gain = task.rate[0] / task.rate[ahead] / factor
-    nu = offsets(task, last)[0] + NX + slacks_of(task) + place_of_rows(task, last, last)
-    nu += slacks_of(task) + FIXED - SOFT
+    gain, bounds = task.rate[0] / task.rate[ahead] / factor, bounds_place(task)[0]
     for i in range(last):
-        at = nu + offsets(task, min(i + ahead, last - 1))[0] + NX
+        nu = bounds + place(task, min(i + ahead, last - 1))[0] + NX
         for a in range(NU):
             below, above = mu / (point.u[i, a] - task.lower[a]), mu / (task.upper[a] - point.u[i, a])
-            duals.below[i, a] = max(-gain * warm_start[at + a], below)
-            duals.above[i, a] = max(gain * warm_start[at + a], above)
-            if i < task.first:
-                duals.below[i, a] = duals.above[i, a] = 0.0
+            if start != COLD and start != HELD:
+                below = max(-gain * warm_start[nu + a], below)
+                above = max(gain * warm_start[nu + a], above)
+            duals.below[i, a] = below if i >= task.first else 0.0
+            duals.above[i, a] = above if i >= task.first else 0.0
 
 
 @inlined
-def old_row(task, last, i, j, solution):
+def old_row(task, i, j, solution):
     """The multiplier of row j of a stage in a solution."""
-    slacks, first = slacks_of(task), FIXED + PER * task.lines
-    lam = offsets(task, last)[0] + NX + slacks
-    if j < first:
-        return solution[lam + place_of_rows(task, i, last) + place_of_row(task, j)]
-    nu = lam + place_of_rows(task, last, last) + slacks + FIXED - SOFT
-    state, sign = int(task.sides[j - first, 0]), task.sides[j - first, 1]
-    return sign * solution[nu + offsets(task, i)[0] + state]
+    z, g = place(task, i)
+    side = j - FIXED - PER * task.lines
+    if side < 0:
+        return solution[g + j]
+    return task.sides[side, 1] * solution[bounds_place(task)[0] + z + int(task.sides[side, 0])]
 
 
 @inlined
@@ -869,16 +899,16 @@ def begin_rows(task, point, duals, start, mu, factor, warm_start):
     last, ahead = len(point.u), 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
     for i in range(task.begin, last + 1):
-        for j in range(duals.lam.shape[1]):
-            source = min(i + ahead, last)
+        for j in range(task.rows):
+            t, source = i * task.rows + j, min(i + ahead, last)
             if task.kind[source, j] != PLANNED:
                 source = i
-            middle = mu / point.slack[i, j]
-            if start != COLD and task.kind[source, j] == PLANNED:
-                old = gain * old_row(task, last, source, j, warm_start)
-                middle = max(old, middle) if point.h[i, j] < 0.0 else min(old, middle)
-            weight = task.weights[i, j]
-            duals.lam[i, j] = min(max(middle, INSIDE * weight), (1.0 - INSIDE) * weight)
+            middle = mu / point.slack[t]
+            if start != COLD and start != HELD and task.kind[source, j] == PLANNED:
+                old = gain * old_row(task, source, j, warm_start)
+                middle = max(old, middle) if point.h[t] < 0.0 else min(old, middle)
+            weight = task.weights[t]
+            duals.lam[t] = min(max(middle, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined
@@ -889,15 +919,18 @@ def recentre(task, point, duals, mu):
             if i >= task.first:
                 duals.below[i, a] = mu / (point.u[i, a] - task.lower[a])
                 duals.above[i, a] = mu / (task.upper[a] - point.u[i, a])
-    for i in range(task.begin, len(duals.lam)):
-        for j in range(duals.lam.shape[1]):
-            duals.lam[i, j] = min(mu / point.slack[i, j], ALMOST * task.weights[i, j])
+    for t in range(task.begin * task.rows, len(duals.lam)):
+        duals.lam[t] = min(mu / point.slack[t], ALMOST * task.weights[t])
 
 
 @inlined
 def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance):
-    """Steps 2 to 7 until one of the ends; the point, its objective, iterations, end and error."""
-    delta, iteration, polished, centred, ended = 0.0, 0, 0, False, LIMIT
+    """Steps 2 to 7 until one of the ends: objective, iterations, end, error, delta and where.
+
+    `where` is true if the last iterate stands in `trial`.
+    """
+    delta, iteration, polished, centred, ended, where = 0.0, 0, 0, False, LIMIT, False
+    added = 0.0
     while True:
         linearise(task, point, duals, stages)
         stationarity, complementarity, largest = residuals(task, point, duals, stages, mu)
@@ -915,10 +948,7 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
             break
         if max(stationarity, complementarity) <= KAPPA_EPSILON * mu and mu > MU_FLOOR * goal:
             mu = max(MU_FLOOR * goal, min(KAPPA_MU * mu, mu**THETA_MU))
-            centre(
-                point.h[task.begin :].ravel(), task.weights[task.begin :].ravel(), mu,
-                point.sigma[task.begin :].ravel(), point.slack[task.begin :].ravel(),
-            )  # fmt: skip
+            centre(task, point, mu)
             total = objective + barrier(task, point, mu)
         iteration += 1
         condense(task, point, duals, stages, mu)
@@ -936,7 +966,7 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
         primal, dual, derivative = newton_step(task, point, duals, stages, mu, step)
         reached, reached_total = search(task, point, trial, mu, step, primal, total, derivative)
         if reached == reached:
-            point, trial, centred = trial, point, False
+            point, trial, where, centred = trial, point, not where, False
             objective, total = reached, reached_total
             advance(task, duals, step, dual)
         elif centred:
@@ -945,140 +975,122 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
         else:
             recentre(task, point, duals, mu)
             centred = True
-    return point, objective, iteration, ended, error
+    return objective, iteration, ended, error, added, where
 
 
 @inlined
-def settle(task, point, tie, h, held):
+def settle(task, point, tie, h, size, held):
     """h of the rows of stage 0, and the multipliers of the soft ones that no plan can change."""
-    size = np.empty(len(h))
     x, u, theta, d = point.x[0], point.u[0], task.theta, task.data[0]
-    fixed_rows(x, u, theta, d, h)
-    fixed_sizes(x, u, theta, d, size)
+    rows_of(task, point.x, point.u, 0, h)
+    fixed_sizes(x, u, theta, d, size, 0)
     for line in range(task.lines):
-        of, at = OWN + WIDTH * line, FIXED + PER * line
-        line_rows(x, u, theta, d, d, h, of, at)
-        line_sizes(x, u, theta, d, d, size, of, at)
+        line_sizes(x, u, theta, d, d, size, OWN + WIDTH * line, FIXED + PER * line)
     for j in range(FIXED + PER * task.lines):
         if task.kind[0, j] == SETTLED:
             soft = j < SOFT or j >= FIXED
-            held[j] = task.weights[0, j] if soft and h[j] > tie * size[j] else 0.0
+            held[j] = task.weights[j] if soft and h[j] > tie * size[j] else 0.0
 
 
 @inlined
-def theta_of_rows(task, x, u, i, last, held, gradient):
-    """Add the gradient of held' h in theta."""
-    theta, d = task.theta, task.data[i]
-    if i < last:
-        theta_fixed(x, u, theta, d, held, gradient, gradient)
-    else:
-        theta_fixed_end(x, u, theta, d, held, gradient, gradient)
+def theta_of_rows(task, x, u, i, held, gradient):
+    """Add the gradient of held' h of a stage in theta."""
+    t, theta, d = task.rows * i, task.theta, task.data[i]
+    theta_fixed(x, u, theta, d, held, gradient, t)
     for line in range(task.lines):
-        of, at = OWN + WIDTH * line, FIXED + PER * line
-        if i < last:
-            theta_line(x, u, theta, d, d, held, gradient, gradient, of, at)
-        else:
-            theta_line_end(x, u, theta, d, d, held, gradient, gradient, of, at)
+        theta_line(
+            x, u, theta, d, d, held, gradient, OWN + WIDTH * line, t + FIXED + PER * line
+        )
 
 
 @inlined
-def write_solution(task, point, duals, stages, objective, factor, tie, out):
+def write_solution(task, point, duals, stages, objective, factor, tie, gradient, out):
     """Write the solution in the order of `Ocp`, and the value's gradient: the kernel's Lagrangian.
 
     Returns the value, the largest violation of a hard row and the largest number in the plan.
     """
-    last, slacks, rows = len(point.u), slacks_of(task), duals.lam.shape[1]
-    variables = offsets(task, last)[0] + NX + slacks
-    nu = variables + place_of_rows(task, last, last) + slacks + FIXED - SOFT
-    phi, first = nu + variables, FIXED + PER * task.lines
+    last, held, h, sides = len(point.u), stages.held, point.h, FIXED + PER * task.lines
+    bounds, end = bounds_place(task)
     violation, largest = 0.0, 0.0
-    gradient, held, h = np.empty(NTHETA), np.empty(rows), np.empty(rows)
-    initial_theta(point.x[0], task.theta, task.data[0], gradient)
-    for a in range(NTHETA):
-        out[phi + a] = gradient[a]
+    settle(task, point, tie, h, stages.firm, held)
     value = factor * objective + initial_cost(point.x[0], task.theta, task.data[0])
+    gradient[:] = 0.0
     for i in range(last + 1):
-        at, row = offsets(task, i)
-        u = point.u[min(i, last - 1)]
-        for j in range(rows):
-            held[j] = duals.lam[i, j] if i >= task.begin and task.kind[i, j] == PLANNED else 0.0
-            h[j] = point.h[i, j]
-        if i == 0:
-            settle(task, point, tie, h, held)
-        rate, data = task.rate[i : i + 1], task.data[i]
+        z, g = place(task, i)
+        u, rate, data = point.u[min(i, last - 1)], task.rate[i:], task.data[i]
+        for a in range(NX):
+            out[z + a] = point.x[i, a]
+            out[bounds + z + a] = 0.0
+            largest = max(largest, abs(point.x[i, a]))
         if i < last:
-            p = stages.p[i + 1]
-            stage_theta(point.x[i], u, task.theta, data, rate, p, gradient)
+            stage_theta(point.x[i], u, task.theta, data, rate, stages.p[i + 1], gradient)
+            after = g - NX if i > 0 else g - 2 * NX - task.first * NU
             for a in range(NX):
-                out[variables + row + a] = -factor * p[a]
+                out[after + a] = -factor * stages.p[i + 1, a]
             for a in range(NU):
-                out[at + NX + a] = u[a]
-                out[nu + at + NX + a] = factor * (duals.above[i, a] - duals.below[i, a])
+                out[z + NX + a] = u[a]
+                out[bounds + z + NX + a] = factor * (duals.above[i, a] - duals.below[i, a])
         else:
             terminal_theta(point.x[i], task.theta, data, rate, gradient)
-        theta_of_rows(task, point.x[i], u, i, last, held, gradient)
-        add(out, phi, factor, gradient)
+        theta_of_rows(task, point.x[i], u, i, held, gradient)
         if i == 0:
-            row = variables + NX  # behind the dynamics
             for a in range(NX):
-                out[row + a] = -factor * stages.p[0, a]
+                out[g - NX - task.first * NU + a] = -factor * stages.p[0, a]
             for a in range(task.first * NU):
-                out[row + NX + a] = -factor * input_gradient(stages, 0, a)
-        for a in range(NX):
-            out[at + a] = point.x[i, a]
-            out[nu + at + a] = 0.0
-            largest = max(largest, abs(point.x[i, a]))
-        row = variables + place_of_rows(task, i, last)
-        sigma = at + NX + (NU if i < last else 0)
-        for j in range(rows):
-            there = task.kind[i, j] == PLANNED or (task.kind[i, j] == SETTLED and j < first)
-            beyond = max(0.0, h[j]) if there else 0.0
-            if j >= first:
-                side = task.sides[j - first]
-                out[nu + at + int(side[0])] += side[1] * factor * held[j]
+                out[g - NU + a] = -factor * input_gradient(stages, 0, a)
+        sigma = z + NX + (NU if i < last else 0)
+        for j in range(task.rows):
+            t = i * task.rows + j
+            planned = task.kind[i, j] == PLANNED
+            there = planned or (task.kind[i, j] == SETTLED and j < sides)
+            beyond, price = max(0.0, h[t]) if there else 0.0, factor * held[t]
+            if j >= sides:
+                out[bounds + z + int(task.sides[j - sides, 0])] += task.sides[j - sides, 1] * price
             else:
-                out[row + place_of_row(task, j)] = factor * held[j]
-            if j >= SOFT and (j < FIXED or j >= first):
-                violation = max(violation, beyond if task.kind[i, j] == PLANNED else 0.0)
+                out[g + j] = price
+            if j >= sides or SOFT <= j < FIXED:
+                violation = max(violation, beyond if planned else 0.0)
                 continue
-            weight, k = factor * task.weights[i, j], place_of_row(task, j)
+            weight, k = factor * task.weights[t], sigma + (j if j < SOFT else SOFT + j - FIXED)
             value += weight * beyond
-            out[sigma + k] = beyond
-            out[nu + sigma + k] = factor * held[j] - weight
+            out[k] = beyond
+            out[bounds + k] = price - weight
+    for a in range(NTHETA):
+        out[end + a] = factor * gradient[a]
+        gradient[a] = 0.0
+    initial_theta(point.x[0], task.theta, task.data[0], gradient)
+    for a in range(NTHETA):
+        out[end + a] += gradient[a]
     return value, violation, largest
 
 
-@inlined
-def add(out, at, times, vector):
-    """Add `times` the vector to a part of `out`."""
-    for a in range(len(vector)):
-        out[at + a] += times * vector[a]
-
-
-@inlined
+@allocating
 def allocate(N, rows):
     """Space for an iterate, a trial of the next one, multipliers, derivatives and a step."""
     point = Point(
         np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N + 1, rows)), np.empty((N + 1, rows)), np.empty((N + 1, rows)),
+        np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.empty((N + 1) * rows),
     )  # fmt: skip
     trial = Point(
         np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N + 1, rows)), np.empty((N + 1, rows)), np.empty((N + 1, rows)),
+        np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.empty((N + 1) * rows),
     )  # fmt: skip
-    duals = Duals(np.empty((N + 1, rows)), np.empty((N, NU)), np.empty((N, NU)))
+    duals = Duals(np.empty((N + 1) * rows), np.empty((N, NU)), np.empty((N, NU)))
     stages = Stages(  # what is written at its nonzeros begins as zeros
         np.zeros((N, NX, NX)), np.zeros((N, NX, NU)),
-        np.zeros((N + 1, rows, NX)), np.zeros((N + 1, rows, NU)),
-        np.empty((N + 1, NX)), np.empty((N + 1, NU)), np.empty((N + 1, NU)), np.empty((N + 1, NX)),
+        np.zeros(((N + 1) * rows, NX)), np.zeros(((N + 1) * rows, NU)),
+        np.empty((N + 1, NX)), np.empty((N + 1, NU)), np.empty((N + 1, NX)), np.empty((N + 1, NU)),
+        np.empty((N + 1, NX)),
         np.empty((N + 1, NX, NX)), np.empty((N + 1, NU, NX)), np.empty((N + 1, NU, NU)),
         np.empty((N + 1, NX)), np.empty((N + 1, NU)),
-        np.empty((N + 1, rows)), np.empty((N + 1, rows)),
-        np.empty(rows), np.empty(rows), np.empty(rows),
+        np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.zeros((N + 1) * rows),
+        np.empty((N + 1) * rows), np.empty((N + 1) * rows),
     )  # fmt: skip
     step = Step(
         np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N + 1, rows)), np.empty((N, NU)), np.empty((N, NU)),
+        np.empty((N + 1) * rows), np.empty((N, NU)), np.empty((N, NU)),
+        np.empty((NX, NX)), np.empty(NX), np.empty(NX), np.empty((NX, NX)), np.empty((NX, NU)),
+        np.empty((NU, NU)), np.empty((NU, NX)), np.empty(NU),
     )  # fmt: skip
     return point, trial, duals, stages, step
 

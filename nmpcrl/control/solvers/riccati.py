@@ -21,14 +21,14 @@ from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Program
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
-from nmpcrl.control.solvers.starts import MOST, Regulator, cold_inputs, random_inputs
+from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
 
 PERTURBED = 4  # starts from random inputs, after everything else
 SEVERAL, FEW = 9, 2  # cold starts of a `Problem` with rows, and without
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
-COLD, SHIFTED, _, SAME = map(int, Start)  # plain numbers, as machine code takes them
+COLD, SHIFTED, SAME = map(int, (Start.COLD, Start.SHIFTED, Start.SAME))  # as machine code takes them
 SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
     End.SOLVED: LED_ASTRAY,
@@ -141,9 +141,8 @@ class Compiled:
         self.tolerance = solver.tolerance
         count = solver.starts_of(problem) - 1
         N = problem.horizon
-        self.none = np.zeros((0, N, problem.inputs))
         others = cold_inputs(problem, N, count)
-        self._others = np.reshape(np.array(others), (-1, N, problem.inputs))
+        self.others = np.reshape(np.array(others), (-1, N, problem.inputs))
         self.drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
         sides = [
             (state, sign, limit[state])
@@ -163,6 +162,7 @@ class Compiled:
             problem.weights.copy(),
             ocp.tie,
         )
+        self._rest = self.arguments[1:]
 
     def solve(
         self,
@@ -175,45 +175,35 @@ class Compiled:
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         given = action[0] if action else self._no_action
-        problem, fixed = (data, *self.arguments[1:]), self._fixed
         start, point = COLD, self._standing
         if warm_start is not None:
             same = warm_start.state.tolist() == state.tolist()  # faster than np.array_equal
             start, point = SAME if same else SHIFTED, self.point_of(warm_start)
-        out, restarts = np.empty(self._size), 0
-        while True:
-            others, drawn = self.none, self.drawn
-            if start == COLD:
-                held = self._regulated(problem, state, theta, given)
-                others, drawn = np.concatenate([self._others, held]), np.concatenate([held, drawn])
-            value, iterations, end, violation, error, failed = self.code(
-                *problem, state, theta, given, fixed, others, drawn,
-                start, self.tolerance, point, out,
-            )  # fmt: skip
-            restarts += int(failed)
-            if end == SOLVED and value < ABSURD:
-                return Solution(
-                    state,
-                    theta,
-                    value,
-                    out[self._split :],
-                    int(iterations),
-                    time.perf_counter() - began,
-                    out[: self._split],
-                    self._ocp,
-                    NAME,
-                    restarts,
-                    violation,
-                    data,
-                )
-            if start == COLD:
-                break
-            start = COLD
+        out = np.empty(self._size)
+        value, iterations, end, violation, error, failed = self.code(
+            data, *self._rest, state, theta, given, self._fixed, self.others, self.drawn,
+            start, self.tolerance, point, out,
+        )  # fmt: skip
+        if end == SOLVED and value < ABSURD:
+            return Solution(
+                state,
+                theta,
+                value,
+                out[self._split :],
+                int(iterations),
+                time.perf_counter() - began,
+                out[: self._split],
+                self._ocp,
+                NAME,
+                int(failed),
+                violation,
+                data,
+            )
         try:
             found = self._fatrop.solve(state, theta, None, *action, began=began, data=data)
         except SolverError:
             raise NoStartLeft(
-                f"{Riccati.name} found no optimum from {restarts} starts (the last"
+                f"{Riccati.name} found no optimum from {failed:.0f} starts (the last"
                 f" {ENDS[End(int(end))]} after {iterations:.0f} iterations with a relative error of"
                 f" {error:.1e})",
                 state,
@@ -224,19 +214,6 @@ class Compiled:
     @cached_property
     def _fatrop(self) -> Program:
         return Program(self._ocp, Fatrop(self.tolerance))
-
-    @cached_property
-    def _regulator(self) -> Regulator:
-        return Regulator(self._problem)
-
-    def _regulated(self, problem: tuple[Any, ...], *given: Vector) -> Matrix:
-        """The inputs of a start that is held by feedback, if there is one, (0 or 1, N, m)."""
-        if self._solver.starts is not None:
-            return self.none
-        state, theta, action = given
-        fixed = (action,) if self._fixed else ()
-        inputs = self._regulator.inputs(state, theta, problem[0], *fixed)
-        return self.none if inputs is None else inputs[None]
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""

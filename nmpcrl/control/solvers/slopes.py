@@ -9,9 +9,8 @@ sweep from the other side, one for each number of the plan and not one for each 
 Where rows and bounds are active that no input can follow all at once, springs of the barrier would
 share what is left between them: `independent` finds out, and `Sensitivity` takes a side instead.
 
-See `hessian` for the barrier parameter and the source. The dynamics' share of G w, f_theta w, is
-taken up by a `drift` of the states in which inputs move by the feedback alone, lest an unstable
-model carry it away.
+The dynamics' share of G w, f_theta w, is taken up by a `drift` of the states in which inputs move
+by the feedback alone, lest an unstable model carry it away.
 """
 
 import numpy as np
@@ -23,22 +22,24 @@ from .kernel import (
     PROBLEM,
     RIGID,
     SAME,
-    add,
     allocate,
+    begin_inputs,
     begin_multipliers,
     condense,
+    described,
+    drifting,
     factorise,
-    hold,
     inlined,
     linearise,
     matrix,
     measure,
-    offsets,
     old_row,
     options,
+    place,
+    roll,
     rows_along,
+    scale,
     scale_rows,
-    scaled,
     settle,
     sweep,
     vector,
@@ -52,14 +53,10 @@ from .model import (
     PER,
     WIDTH,
     along_theta_fixed,
-    along_theta_fixed_end,
     along_theta_line,
-    along_theta_line_end,
     initial_along,
     mixed_fixed,
-    mixed_fixed_end,
     mixed_line,
-    mixed_line_end,
     stage_along,
     stage_mixed,
     terminal_along,
@@ -76,12 +73,13 @@ ROWS = 1e-10  # barrier parameter of the rows: of RIGID they lose digits, where 
 @inlined
 def restore_rows(task, duals, factor, solved):
     """The rows' multipliers as they were solved for, upon which the costates depend."""
-    for i in range(task.begin, len(duals.lam)):
-        for j in range(duals.lam.shape[1]):
-            weight, old = task.weights[i, j], 0.0
+    for i in range(task.begin, len(task.rate)):
+        for j in range(task.rows):
+            t = i * task.rows + j
+            weight, old = task.weights[t], 0.0
             if task.kind[i, j] == PLANNED:
-                old = old_row(task, len(duals.lam) - 1, i, j, solved) / factor
-            duals.lam[i, j] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
+                old = old_row(task, i, j, solved) / factor
+            duals.lam[t] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined
@@ -90,15 +88,15 @@ def independent(task, stages, step):
 
     Each active row is asked to move by another amount, and all have to.
     """
-    last, rows = len(step.u), 0
+    off, rows = stages.off, 0
     stages.q[:] = 0.0
     stages.r[:] = 0.0
-    stages.off[:] = 0.0
-    for i in range(task.begin, last + 1):
-        for j in range(stages.off.shape[1]):
-            if task.kind[i, j] == PLANNED and stages.stiff[i, j] > STIFF:
-                rows += 1
-                stages.off[i, j] = 1.0 + (GOLDEN * rows) % 1.0
+    for t in range(len(off)):
+        off[t] = 0.0
+        if task.planned[t] > 0.0 and stages.stiff[t] > STIFF:
+            rows += 1
+            off[t] = 1.0 + (GOLDEN * rows) % 1.0
+    for i in range(task.begin, len(task.rate)):
         pull_of_rows(task, stages, i)
     if not factorise(stages, 0.0, task.first, step):
         return False
@@ -106,10 +104,9 @@ def independent(task, stages, step):
         return True
     sweep(task, stages, step)
     rows_along(task, stages, step)
-    for i in range(task.begin, last + 1):
-        for j in range(stages.off.shape[1]):
-            if stages.off[i, j] > 0.0 and abs(stages.off[i, j] + step.lam[i, j]) > LEFT:
-                return False
+    for t in range(task.begin * task.rows, len(off)):
+        if off[t] > 0.0 and abs(off[t] + step.lam[t]) > LEFT:
+            return False
     return True
 
 
@@ -117,71 +114,44 @@ def independent(task, stages, step):
 def pull_of_rows(task, stages, i):
     """Add h' stiff off of a stage to q and r."""
     first = FIXED + PER * task.lines
-    for j in range(stages.off.shape[1]):
-        pull = stages.stiff[i, j] * stages.off[i, j]
+    for j in range(task.rows):
+        t = i * task.rows + j
+        pull = stages.stiff[t] * stages.off[t]
         if j >= first:
-            side = task.sides[j - first]
-            stages.q[i, int(side[0])] += pull * side[1]
+            stages.q[i, int(task.sides[j - first, 0])] += pull * task.sides[j - first, 1]
             continue
         for a in range(NX):
-            stages.q[i, a] += pull * stages.hx[i, j, a]
+            stages.q[i, a] += pull * stages.hx[t, a]
         for a in range(NU if i < len(stages.A) else 0):
-            stages.r[i, a] += pull * stages.hu[i, j, a]
+            stages.r[i, a] += pull * stages.hu[t, a]
 
 
 @inlined
-def right_hand_side(task, point, duals, stages, step, w, drift, steer):
+def right_hand_side(task, point, stages, step, w, drift, steer):
     """G w as q, r and `off`, and as the drift, after `condense` and `factorise`."""
-    last, theta = len(point.u), task.theta
-    held, f, off = stages.held, np.empty(NX), stages.off
-    for a in range(NX):
-        drift[0, a] = 0.0
+    last, theta, held, off = len(point.u), task.theta, stages.held, stages.off
+    stages.q[:] = 0.0
+    stages.r[:] = 0.0
     for i in range(last + 1):
-        q, r, d, rate = stages.q[i], stages.r[i], task.data[i], task.rate[i : i + 1]
-        x, u = point.x[i], point.u[min(i, last - 1)]
+        q, r, d, rate = stages.q[i], stages.r[i], task.data[i], task.rate[i:]
+        x, u, t = point.x[i], point.u[min(i, last - 1)], i * task.rows
         if i < last:
-            stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, f)
+            stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, drift[i + 1])
         else:
             terminal_mixed(x, theta, d, rate, w, q)
         if i >= task.begin:
-            hold(task, duals, i, held)
-            for j in range(off.shape[1]):
-                off[i, j] = 0.0
-            if i < last:
-                mixed_fixed(x, u, theta, d, held, w, q, r, off[i], q, r)
-            else:
-                mixed_fixed_end(x, u, theta, d, held, w, q, r, off[i], q, r)
+            for j in range(task.rows):
+                off[t + j] = 0.0
+            mixed_fixed(x, u, theta, d, held, w, q, r, off, t)
             for line in range(task.lines):
-                of, at = OWN + WIDTH * line, FIXED + PER * line
-                if i < last:
-                    mixed_line(x, u, theta, d, d, held, w, q, r, off[i], q, r, of, at)
-                else:
-                    mixed_line_end(x, u, theta, d, d, held, w, q, r, off[i], q, r, of, at)
-            for j in range(off.shape[1]):
-                off[i, j] = off[i, j] if task.kind[i, j] == PLANNED else 0.0
+                mixed_line(
+                    x, u, theta, d, d, held, w, q, r, off,
+                    OWN + WIDTH * line, t + FIXED + PER * line,
+                )  # fmt: skip
+            for j in range(task.rows):
+                off[t + j] = off[t + j] if task.planned[t + j] > 0.0 else 0.0
             pull_of_rows(task, stages, i)
-        if i < last:
-            for a in range(NU):
-                steer[i, a] = 0.0
-                for b in range(NX if i >= task.first else 0):
-                    steer[i, a] += step.K[i, a, b] * drift[i, b]
-            for a in range(NX):
-                drift[i + 1, a] = f[a]
-                for b in range(NX):
-                    drift[i + 1, a] += stages.A[i, a, b] * drift[i, b]
-                for b in range(NU):
-                    drift[i + 1, a] += stages.B[i, a, b] * steer[i, b]
-        for b in range(NX):
-            for a in range(NX):
-                q[a] += stages.Q[i, a, b] * drift[i, b]
-            if i < last:
-                for a in range(NU):
-                    r[a] += stages.S[i, a, b] * drift[i, b]
-        for b in range(NU if i < last else 0):
-            for a in range(NX):
-                q[a] += stages.S[i, b, a] * steer[i, b]
-            for a in range(NU):
-                r[a] += stages.R[i, a, b] * steer[i, b]
+    drifting(task, stages, step, drift, steer)
 
 
 @inlined
@@ -202,39 +172,28 @@ def costates_along(stages, step, dp):
 
 
 @inlined
-def gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out):
+def gradient_along(task, point, stages, step, dp, factor, w, out):
     """The derivative of the value's gradient along the step and w."""
-    last, theta, rows = len(point.u), task.theta, duals.lam.shape[1]
-    gradient, held, h = np.empty(NTHETA), stages.held, np.empty(rows)
-    initial_along(point.x[0], theta, task.data[0], w, gradient)
+    last, theta, held = len(point.u), task.theta, stages.held
     for a in range(NTHETA):
-        out[a] = gradient[a]
+        out[a] = 0.0
     for i in range(last + 1):
-        for j in range(rows):
-            held[j] = 0.0
-        if i >= task.begin:
-            hold(task, duals, i, held)
-        if i == 0:
-            settle(task, point, tie, h, held)
-        rate, d, dlam, dx = task.rate[i : i + 1], task.data[i], step.lam[i], step.x[i]
-        x, u, du = point.x[i], point.u[min(i, last - 1)], step.u[min(i, last - 1)]
+        rate, d, t = task.rate[i:], task.data[i], i * task.rows
+        x, dx = point.x[i], step.x[i]
+        u, du = point.u[min(i, last - 1)], step.u[min(i, last - 1)]
         if i < last:
-            stage_along(x, u, theta, d, rate, stages.p[i + 1], dx, du, dp[i + 1], w, gradient)
-            along_theta_fixed(x, u, theta, d, held, dx, du, dlam, w, gradient, gradient)
+            stage_along(x, u, theta, d, rate, stages.p[i + 1], dx, du, dp[i + 1], w, out)
         else:
-            terminal_along(x, theta, d, rate, dx, w, gradient)
-            along_theta_fixed_end(x, u, theta, d, held, dx, du, dlam, w, gradient, gradient)
+            terminal_along(x, theta, d, rate, dx, w, out)
+        along_theta_fixed(x, u, theta, d, held, dx, du, step.lam, w, out, t)
         for line in range(task.lines):
-            of, at = OWN + WIDTH * line, FIXED + PER * line
-            if i < last:
-                along_theta_line(
-                    x, u, theta, d, d, held, dx, du, dlam, w, gradient, gradient, of, at
-                )
-            else:
-                along_theta_line_end(
-                    x, u, theta, d, d, held, dx, du, dlam, w, gradient, gradient, of, at
-                )
-        add(out, 0, factor, gradient)
+            along_theta_line(
+                x, u, theta, d, d, held, dx, du, step.lam, w, out,
+                OWN + WIDTH * line, t + FIXED + PER * line,
+            )  # fmt: skip
+    for a in range(NTHETA):
+        out[a] *= factor
+    initial_along(point.x[0], theta, task.data[0], w, out)
 
 
 SIGNATURE = types.boolean(*PROBLEM, vector, vector, matrix, matrix, vector)
@@ -251,17 +210,17 @@ def slopes(
     be formed: not where the solution is no strict minimum, or inputs cannot follow what is active.
     """
     N, mu = len(discount) - 1, RIGID
-    point, _, duals, stages, step = allocate(N, len(weights) + len(sides))
+    task = described(theta, data, lower, upper, sides, kind, discount, weights, fixed)
+    point, _, duals, stages, step = allocate(N, task.rows)
     drift, dp, steer = np.empty((N + 1, NX)), np.empty((N + 1, NX)), np.empty((N, NU))
-    task, factor = scaled(
-        theta, data, lower, upper, sides, kind, discount, weights, fixed, point, state, action,
-        SAME, solved,
-    )  # fmt: skip
+    begin_inputs(task, point, state, action, SAME, steer, solved)
+    roll(task, point)
+    factor = scale(task, point, weights)
     begin_multipliers(task, point, duals, SAME, mu, factor, solved)
     for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
-        at = offsets(task, i)[0]
+        z = place(task, i)[0]
         for a in range(NX):
-            point.x[i, a] = solved[at + a]
+            point.x[i, a] = solved[z + a]
     measure(task, point, ROWS)
     restore_rows(task, duals, factor, solved)
     linearise(task, point, duals, stages)
@@ -269,7 +228,7 @@ def slopes(
     step.lam[:] = 0.0
     if not independent(task, stages, step):
         return False
-    right_hand_side(task, point, duals, stages, step, w, drift, steer)
+    right_hand_side(task, point, stages, step, w, drift, steer)
     for i in range(N + 1):
         for a in range(NX):
             stages.q[i, a] += of_states[i, a] / factor
@@ -289,5 +248,6 @@ def slopes(
             step.u[i, a] += steer[i, a]
     rows_along(task, stages, step)
     scale_rows(task, stages, step)
-    gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out)
+    settle(task, point, tie, point.h, stages.firm, stages.held)
+    gradient_along(task, point, stages, step, dp, factor, w, out)
     return True

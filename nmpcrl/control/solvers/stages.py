@@ -25,7 +25,8 @@ SOFT, FIXED, PER, OWN, WIDTH = {rows}
 '''
 MATRICES = ("A", "B", "Q", "S", "R", "hx", "hu")
 SPARSE = ("A", "B", "hx", "hu")
-SHIFTED = {"line": "of", **dict.fromkeys(  # what the rows of a line are a part of
+ADDED = ("px", "pu", "q", "r", "Q", "S", "R", "gradient")
+BEGINS = {"line": "of", **dict.fromkeys(  # at which index of an array a stage's rows begin
     ("h", "size", "lam", "dlam", "hx", "hu", "stiff", "pull"), "at")}  # fmt: skip
 STEEP = 100.0  # slope of a stage that counts as much as a curvature of 2, as of Ipopt
 
@@ -41,31 +42,35 @@ def write(problem: Problem) -> str:
     fixed = of.fixed.numel()
     soft = int(np.isfinite(problem.weights[:fixed]).sum())
     rows = soft, fixed, of.each.numel(), of.d.numel(), of.line.numel()
-    bodies = [
-        INNER
-        + source(
-            f,
-            returned=f.name_out() == ["cost"],
-            matrices=MATRICES,
-            sparse=SPARSE,
-            shifted=SHIFTED if "line" in f.name() else {},
-        )
-        for f in functions(problem)
-    ]
+    bodies = [INNER + _written(f) for f in functions(problem)]
     return "\n\n".join([HEADER.format(sizes=sizes, rows=rows), *bodies])
+
+
+def _written(f: ca.Function) -> str:
+    """The text of a function of `model`."""
+    names = [*f.name_in(), *f.name_out()]
+    return source(
+        f,
+        returned=f.name_out() == ["cost"],
+        matrices=MATRICES,
+        sparse=SPARSE,
+        added=ADDED,
+        shifted={name: begin for name, begin in BEGINS.items() if name in names},
+    )
 
 
 def functions(problem: Problem) -> Iterator[ca.Function]:
     """Every function of `model`, with the names of its arguments."""
     e = problem.expressions
-    x, u, theta, d, n = e.x, e.u, e.theta, e.d, e.x.numel()
+    x, u, theta, n = e.x, e.u, e.theta, e.x.numel()
     z = ca.vertcat(x, u)
     discount, costate = ca.SX.sym("discount"), ca.SX.sym("costate", n)
     dx, du, w = (ca.SX.sym(name, of.numel()) for name, of in (("dx", x), ("du", u), ("w", theta)))
     dcostate = ca.SX.sym("dcostate", n)
-    point = {"x": x, "u": u, "theta": theta, "d": d}
-    end = {"x": x, "theta": theta, "d": d}
+    point = {"x": x, "u": u, "theta": theta, "d": e.d}
+    end = {"x": x, "theta": theta, "d": e.d}
     weighed = {**point, "discount": discount, "costate": costate}
+    weighed_end = {**end, "discount": discount}
     path, last = discount * e.stage + ca.dot(costate, e.next_x), discount * e.terminal
     hessian, slope = ca.hessian(path, z)
     bend_end, slope_end = ca.hessian(last, x)
@@ -81,54 +86,39 @@ def functions(problem: Problem) -> Iterator[ca.Function]:
     yield _function("stage_size", point, {"cost": _size(e.stage, z)})
     yield _function("terminal_size", end, {"cost": _size(e.terminal, x)})
     of_stage = ca.gradient(discount * e.stage, z)
-    expand = {
-        "A": ca.jacobian(e.next_x, x), "B": ca.jacobian(e.next_x, u),
-        "lx": of_stage[:n], "lu": of_stage[n:],
-        "Q": hessian[:n, :n], "S": hessian[n:, :n], "R": hessian[n:, n:],
-    }  # fmt: skip
-    yield _function("expand_stage", weighed, expand)
-    yield _function(
-        "expand_terminal", {**end, "discount": discount}, {"lx": slope_end, "Q": bend_end}
-    )
+    slopes = ca.jacobian(e.next_x, z)
+    expand = {"A": slopes[:, :n], "B": slopes[:, n:], "lx": of_stage[:n], "lu": of_stage[n:]}
+    yield _function("expand_stage", weighed, expand | _blocks(hessian, n))
+    yield _function("expand_terminal", weighed_end, {"lx": slope_end, "Q": bend_end})
     yield _function("stage_theta", weighed, {"gradient": path_theta})
-    yield _function("terminal_theta", {**end, "discount": discount}, {"gradient": last_theta})
+    yield _function("terminal_theta", weighed_end, {"gradient": last_theta})
     yield _function("initial_theta", end, {"gradient": first_theta})
     mixed = ca.jtimes(slope, theta, w)
-    of_theta = {"lx": mixed[:n], "lu": mixed[n:], "f": ca.jtimes(e.next_x, theta, w)}
+    of_theta = {"q": mixed[:n], "r": mixed[n:], "f": ca.jtimes(e.next_x, theta, w)}
     yield _function("stage_mixed", {**weighed, "w": w}, of_theta)
     yield _function(
-        "terminal_mixed",
-        {**end, "discount": discount, "w": w},
-        {"lx": ca.jtimes(slope_end, theta, w)},
+        "terminal_mixed", {**weighed_end, "w": w}, {"q": ca.jtimes(slope_end, theta, w)}
     )
     steps = {"dx": dx, "du": du, "dcostate": dcostate, "w": w}
     yield _function("stage_along", {**weighed, **steps}, {"gradient": _along(path_theta, *moved)})
     yield _function(
         "terminal_along",
-        {**end, "discount": discount, "dx": dx, "w": w},
+        {**weighed_end, "dx": dx, "w": w},
         {"gradient": _along(last_theta, (x, dx), (theta, w))},
     )
     yield _function(
         "initial_along", {**end, "w": w}, {"gradient": ca.jtimes(first_theta, theta, w)}
     )
-    line = {"line": e.line}
-    for name, rows, sizes, more in (
-        ("fixed", e.fixed, problem.row_sizes(e.fixed), {}),
-        ("line", e.each, problem.row_sizes(e.each), line),
-    ):
+    for name, rows, more in (("fixed", e.fixed, {}), ("line", e.each, {"line": e.line})):
+        sizes = problem.row_sizes(rows)
         yield _function(f"{name}_sizes", {**point, **more}, {"size": sizes})
         yield from _of_rows(name, rows, {**point, **more}, (dx, du, w))
-        at_end = ca.vertcat(
-            ca.SX(0, 1),
-            *(0 if ca.depends_on(row, u) else row for row in ca.vertsplit(rows)),
-        )
-        yield from _of_rows(f"{name}_end", at_end, {**point, **more}, (dx, du, w))
 
 
 def _of_rows(
     name: str, rows: ca.SX, point: dict[str, ca.SX], steps: tuple[ca.SX, ca.SX, ca.SX]
 ) -> Iterator[ca.Function]:
-    """What is asked of rows h, all results but h, hx and hu being added to what is there."""
+    """The functions of rows h."""
     x, u, theta, n = point["x"], point["u"], point["theta"], point["x"].numel()
     dx, du, w = steps
     z = ca.vertcat(x, u)
@@ -137,42 +127,37 @@ def _of_rows(
     hessian, slope = ca.hessian(held, z)
     slopes = ca.jacobian(rows, z)
     of_theta = ca.gradient(held, theta)
-    parts = {"Q": hessian[:n, :n], "S": hessian[n:, :n], "R": hessian[n:, n:]}
+    known = {**point, "lam": lam}
+    expand = {"hx": slopes[:, :n], "hu": slopes[:, n:], "px": slope[:n], "pu": slope[n:]}
     yield _function(f"{name}_rows", point, {"h": rows})
-    yield _function(
-        f"expand_{name}",
-        {**point, "lam": lam},
-        {"hx": slopes[:, :n], "hu": slopes[:, n:]},
-        {"px": slope[:n], "pu": slope[n:], **parts},
-    )
+    yield _function(f"expand_{name}", known, expand | _blocks(hessian, n))
     hx, Hx = _nonzeros("hx", slopes[:, :n])
     hu, Hu = _nonzeros("hu", slopes[:, n:])
     stiff, pull = ca.SX.sym("stiff", rows.numel()), ca.SX.sym("pull", rows.numel())
-    D = ca.diag(stiff)
+    H, gradients = ca.horzcat(Hx, Hu), {"hx": hx, "hu": hu}
     yield _function(
         f"condense_{name}",
-        {"stiff": stiff, "pull": pull, "hx": hx, "hu": hu},
-        {},
-        {"q": Hx.T @ pull, "r": Hu.T @ pull,
-         "Q": Hx.T @ D @ Hx, "S": Hu.T @ D @ Hx, "R": Hu.T @ D @ Hu},
-    )  # fmt: skip
-    yield _function(
-        f"along_{name}", {"hx": hx, "hu": hu, "dx": dx, "du": du}, {"h": Hx @ dx + Hu @ du}
+        {"stiff": stiff, "pull": pull, **gradients},
+        {"q": Hx.T @ pull, "r": Hu.T @ pull, **_blocks(H.T @ ca.diag(stiff) @ H, n)},
     )
-    yield _function(f"theta_{name}", {**point, "lam": lam}, {}, {"gradient": of_theta})
+    yield _function(f"along_{name}", {**gradients, "dx": dx, "du": du}, {"h": Hx @ dx + Hu @ du})
+    yield _function(f"theta_{name}", known, {"gradient": of_theta})
     mixed = ca.jtimes(slope, theta, w)
     yield _function(
         f"mixed_{name}",
-        {**point, "lam": lam, "w": w},
-        {"h": ca.jtimes(rows, theta, w)},
-        {"lx": mixed[:n], "lu": mixed[n:]},
+        {**known, "w": w},
+        {"q": mixed[:n], "r": mixed[n:], "h": ca.jtimes(rows, theta, w)},
     )
     yield _function(
         f"along_theta_{name}",
-        {**point, "lam": lam, "dx": dx, "du": du, "dlam": dlam, "w": w},
-        {},
+        {**known, "dx": dx, "du": du, "dlam": dlam, "w": w},
         {"gradient": _along(of_theta, (x, dx), (u, du), (lam, dlam), (theta, w))},
     )
+
+
+def _blocks(hessian: ca.SX, n: int) -> dict[str, ca.SX]:
+    """A Hessian in (x, u) by its blocks."""
+    return {"Q": hessian[:n, :n], "S": hessian[n:, :n], "R": hessian[n:, n:]}
 
 
 def _along(of: ca.SX, *moved: tuple[ca.SX, ca.SX]) -> ca.SX:
@@ -197,16 +182,5 @@ def _nonzeros(name: str, slopes: ca.SX) -> tuple[ca.SX, ca.SX]:
     return argument, found
 
 
-def _function(
-    name: str,
-    of: dict[str, ca.SX],
-    results: dict[str, ca.SX],
-    added: dict[str, ca.SX] | None = None,
-) -> ca.Function:
-    """A function that writes results in place, and adds others to what is there."""
-    for what, value in (added or {}).items():
-        there = ca.SX.sym(what, *value.shape)
-        of = {**of, what: there}
-        results = {**results, what: ca.project(there, value.sparsity()) + value}
-    options = {"allow_duplicate_io_names": True}
-    return ca.Function(name, [*of.values()], [*results.values()], [*of], [*results], options)
+def _function(name: str, of: dict[str, ca.SX], results: dict[str, ca.SX]) -> ca.Function:
+    return ca.Function(name, [*of.values()], [*results.values()], [*of], [*results])

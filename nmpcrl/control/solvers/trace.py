@@ -31,9 +31,10 @@ def interpreted(of: Problem) -> ModuleType:
     """
     plain = ModuleType("riccati")
     names = vars(plain)
-    solve = machine_code(of).py_func
-    names.update(solve.__globals__["iterate"].py_func.__globals__)
-    names.update(solve.__globals__)
+    find = machine_code(of).py_func
+    solve = find.__globals__["solve"].py_func
+    for function in (solve.__globals__["iterate"].py_func, solve, find):
+        names.update(function.__globals__)
     for name, found in list(names.items()):
         if hasattr(found, "py_func"):
             names[name] = FunctionType(found.py_func.__code__, names, name)
@@ -76,16 +77,18 @@ def trace(
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
         stationarity, complementarity, largest = norms
         objective, _ = plain.measure(task, point, mu)
-        priced = np.flatnonzero(ocp.problem.soft)
-        beyond = np.maximum(0, point.h[task.begin :, priced])
-        slacks = (task.weights[task.begin :, priced] * beyond).sum()
+        beyond, weights = (
+            np.reshape(of_rows, (-1, task.rows))[task.begin :, np.flatnonzero(ocp.problem.soft)]
+            for of_rows in (np.maximum(0, point.h), task.weights)
+        )
+        slacks = (weights * beyond).sum()
         error, value = max(stationarity / largest, complementarity, mu), objective + slacks
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
         rows[-1]["delta"] = delta
 
-    _watch(plain, "scaled", lambda result, *_: factor.append(result[1]))
+    _watch(plain, "scale", lambda size, *_: factor.append(size))
     _watch(plain, "residuals", judged)
     _watch(plain, "factorise", factorised)
     if not curvature:
@@ -99,11 +102,13 @@ def trace(
 
 def _point(ocp: Ocp, plain: ModuleType) -> Compiled:
     """The OCP with plain Python for its machine code, and its first start taken as it ends."""
+    solve = plain.solve
 
-    def solve(*arguments: Any) -> tuple[Any, ...]:
-        return (*plain.solve(*arguments)[:2], End.SOLVED, 0.0, 0.0)
+    def taken(*arguments: Any) -> tuple[Any, ...]:
+        return (0.0, solve(*arguments)[1], float(End.SOLVED), 0.0, 0.0)
 
-    return Compiled(ocp, solve, Riccati(starts=1))
+    vars(plain)["solve"] = taken
+    return Compiled(ocp, plain.find, Riccati(starts=1))
 
 
 def _settled(ocp: Ocp, state: Vector, theta: Vector, data: Matrix) -> float:
@@ -131,7 +136,7 @@ def _straighten(plain: ModuleType) -> None:
     """Differentiate as if dynamics and rows were straight lines."""
     names = vars(plain)
     names["expand_stage"] = _without(plain.expand_stage, 5)  # costate
-    for name in ("expand_fixed", "expand_fixed_end", "expand_line", "expand_line_end"):
+    for name in ("expand_fixed", "expand_line"):
         names[name] = _straight(names[name])
 
 
@@ -139,7 +144,7 @@ def _straight(expand: Callable[..., None]) -> Callable[..., None]:
     """What rows add to a stage but for their curvature."""
 
     def called(*arguments: Any) -> None:
-        *point, Q, S, R = arguments[:-2] if "line" in expand.__name__ else arguments
+        *_, Q, S, R = arguments[: -2 if "line" in expand.__name__ else -1]
         before = [one.copy() for one in (Q, S, R)]
         expand(*arguments)
         for one, old in zip((Q, S, R), before, strict=True):
