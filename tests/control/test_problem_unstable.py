@@ -144,7 +144,7 @@ def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
     problem = scalar(5)
     nmpc = Nmpc(problem)
     code, best = nmpc._free.solver, nmpc.solve([1.0], problem.theta)
-    monkeypatch.setattr(code, "_code", lambda *_: (0.0, 1.0, float(End.STALLED), 0.0, 1.0))
+    monkeypatch.setattr(code, "code", lambda *_: (0.0, 1.0, float(End.STALLED), 0.0, 1.0, 7.0))
     found = nmpc.solve([1.0], problem.theta, best)
     assert (found.status, found.solver) == (Status.TAKEN_OVER, "fatrop")
     assert found.value == pytest.approx(best.value, rel=1e-6)

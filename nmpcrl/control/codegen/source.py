@@ -14,7 +14,8 @@ import casadi as ca
 # Stands above what machine code alone calls: a wrapper for Python takes long to compile, and
 # counting who refers to an array takes a tenth of the time of what is called often.
 INNER = (
-    '@njit(error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)\n'
+    '@njit(error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True,'
+    " _nrt=False)\n"
 )
 UNARY = {
     ca.OP_ASSIGN: "{}",
@@ -117,9 +118,7 @@ def returns(function: ca.Function) -> bool:
     return function.n_out() == 1 and function.size_out(0) == (1, 1)
 
 
-def _expressions(
-    function: ca.Function, sparse: Collection[str]
-) -> tuple[list[ca.SX], list[ca.SX]]:
+def _expressions(function: ca.Function, sparse: Collection[str]) -> tuple[list[ca.SX], list[ca.SX]]:
     """Arguments and results, dense unless `sparse`, common subexpressions eliminated."""
     arguments = function.sx_in()
     named = zip(function.name_out(), function.call(arguments), strict=True)

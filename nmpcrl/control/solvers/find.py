@@ -3,7 +3,7 @@
 import numpy as np
 from numba import float64, int64, njit, types
 
-from .kernel import COLD, HELD, NEAR, PROBLEM, SAME, SOLVED, matrix, options, tensor, vector
+from .kernel import COLD, HELD, NEAR, PROBLEM, SAME, SOLVED, options, tensor, vector
 from .model import NU
 from .solve import solve
 

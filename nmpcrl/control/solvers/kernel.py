@@ -78,7 +78,7 @@ from .model import (
 COLD, SHIFTED, NEAR, SAME, HELD = map(int, Start)
 SOLVED, STALLED, LIMIT, BROKEN, SADDLE = map(int, End)
 START_MU = (10.0, 1e-3, 1e-3, 1e-9, 10.0)  # the barrier parameter
-PUSH = (1e-2, 1e-3, 1e-3, 1e-9, 1e-2)  # inside its bounds an input starts, in parts of their distance
+PUSH = (1e-2, 1e-3, 1e-3, 1e-9, 1e-2)  # of its bounds' distance, by which an input starts inside
 
 PLANNED, SETTLED = 1, 2  # kinds of rows, else absent
 STRICT = 1e4  # W of hard rows, scaled: an exact penalty, so that no state is infeasible
@@ -799,7 +799,7 @@ def begin_inputs(task, point, state, action, start, inputs, warm_start):
         for a in range(NU):
             low, high = task.lower[a], task.upper[a]
             push = PUSH[start] * min(1.0, high - low)
-            u = inputs[i, a] if start == COLD or start == HELD else warm_start[z + NX + a]
+            u = inputs[i, a] if start in (COLD, HELD) else warm_start[z + NX + a]
             point.u[i, a] = min(max(u, low + push), high - push)
             if i < task.first:
                 point.u[i, a] = action[a]
@@ -875,8 +875,11 @@ def begin_multipliers(task, point, duals, start, mu, factor, warm_start):
     for i in range(last):
         nu = bounds + place(task, min(i + ahead, last - 1))[0] + NX
         for a in range(NU):
-            below, above = mu / (point.u[i, a] - task.lower[a]), mu / (task.upper[a] - point.u[i, a])
-            if start != COLD and start != HELD:
+            below, above = (
+                mu / (point.u[i, a] - task.lower[a]),
+                mu / (task.upper[a] - point.u[i, a]),
+            )
+            if start not in (COLD, HELD):
                 below = max(-gain * warm_start[nu + a], below)
                 above = max(gain * warm_start[nu + a], above)
             duals.below[i, a] = below if i >= task.first else 0.0
@@ -904,7 +907,7 @@ def begin_rows(task, point, duals, start, mu, factor, warm_start):
             if task.kind[source, j] != PLANNED:
                 source = i
             middle = mu / point.slack[t]
-            if start != COLD and start != HELD and task.kind[source, j] == PLANNED:
+            if start not in (COLD, HELD) and task.kind[source, j] == PLANNED:
                 old = gain * old_row(task, source, j, warm_start)
                 middle = max(old, middle) if point.h[t] < 0.0 else min(old, middle)
             weight = task.weights[t]
@@ -998,9 +1001,7 @@ def theta_of_rows(task, x, u, i, held, gradient):
     t, theta, d = task.rows * i, task.theta, task.data[i]
     theta_fixed(x, u, theta, d, held, gradient, t)
     for line in range(task.lines):
-        theta_line(
-            x, u, theta, d, d, held, gradient, OWN + WIDTH * line, t + FIXED + PER * line
-        )
+        theta_line(x, u, theta, d, d, held, gradient, OWN + WIDTH * line, t + FIXED + PER * line)
 
 
 @inlined

@@ -21,7 +21,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import FARTHEST, FASTEST
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import NoStartLeft, Solution, SolverError, check_shape
+from nmpcrl.control.solution import NoStartLeft, Solution, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 from nmpcrl.control.solvers.starts import Regulator, random_inputs

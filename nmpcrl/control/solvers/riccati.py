@@ -28,7 +28,9 @@ PERTURBED = 4  # starts from random inputs, after everything else
 SEVERAL, FEW = 9, 2  # cold starts of a `Problem` with rows, and without
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
-COLD, SHIFTED, SAME = map(int, (Start.COLD, Start.SHIFTED, Start.SAME))  # as machine code takes them
+COLD, SHIFTED, SAME = map(
+    int, (Start.COLD, Start.SHIFTED, Start.SAME)
+)  # as machine code takes them
 SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
     End.SOLVED: LED_ASTRAY,

@@ -53,7 +53,7 @@ def solve(
     """
     task = described(theta, data, lower, upper, sides, kind, discount, weights, fixed)
     point, trial, duals, stages, step = allocate(len(discount) - 1, task.rows)
-    mu, cold = START_MU[start], start == COLD or start == HELD
+    mu, cold = START_MU[start], start in (COLD, HELD)
     begin_inputs(task, point, state, action, start, inputs, warm_start)
     if start == HELD:
         regulate(task, trial, stages, step, point)

@@ -75,9 +75,7 @@ def functions(problem: Problem) -> Iterator[ca.Function]:
     hessian, slope = ca.hessian(path, z)
     bend_end, slope_end = ca.hessian(last, x)
     moved = ((x, dx), (u, du), (costate, dcostate), (theta, w))
-    path_theta, last_theta, first_theta = (
-        ca.gradient(f, theta) for f in (path, last, e.initial)
-    )
+    path_theta, last_theta, first_theta = (ca.gradient(f, theta) for f in (path, last, e.initial))
 
     yield _function("transition", point, {"next_x": e.next_x})
     yield _function("stage_cost", point, {"cost": e.stage})

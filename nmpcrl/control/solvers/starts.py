@@ -70,7 +70,9 @@ class Regulator:
 
     def slopes(self, state: Vector, theta: Vector, data: Matrix) -> Matrix:
         """The model's derivative in the state at rest, shape (n, n)."""
-        of_state_and_input: Matrix = self._stage(state, self._still, theta, self._problem.own(data[0]))[1].full()
+        of_state_and_input: Matrix = self._stage(
+            state, self._still, theta, self._problem.own(data[0])
+        )[1].full()
         return of_state_and_input[:, : state.size]
 
     def states(self, state: Vector, inputs: Matrix, theta: Vector, data: Matrix) -> Matrix:

@@ -9,7 +9,9 @@ from scipy.special import erfinv
 
 from nmpcrl.control import Fatrop, Nmpc, Plant, Riccati, SolverError, Task
 from nmpcrl.control.codegen import jit
-from nmpcrl.control.solvers import riccati as front
+from nmpcrl.control.solvers.nlpsol import Program
+from nmpcrl.control.solvers.riccati import machine_code
+from nmpcrl.control.solvers.trace import interpreted
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -52,16 +54,23 @@ def test_inside_nothing_is_violated_whatever_a_slack_costs(riccati):
             assert nmpc.solve(state, THETA).violation <= 1e-6
 
 
-def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati, monkeypatch):
+def limited(**limits: int) -> Nmpc:
+    """The paper's controller run by Python, with other limits of iterations and one cold start."""
+    plain = interpreted(paper.nmpc().problem)
+    vars(plain).update(limits)
+    return paper.nmpc(solver=Riccati(code=lambda _: plain.find, starts=1))
+
+
+def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati):
     other = THETA * np.linspace(0.5, 2, 9)
     warm_start, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
     assert (cold.restarts, cold.status) == (0, "solved")
-    monkeypatch.setattr(front, "WARM_LIMIT", 1)
-    shifted = riccati.solve(START + 0.1, other, warm_start)
+    nmpc = limited(WARM_LIMIT=1)
+    shifted = nmpc.solve(START + 0.1, other, warm_start)
     assert (shifted.restarts, shifted.status) == (1, "restarted")
-    same = riccati.solve(START, other, warm_start)
+    same = nmpc.solve(START, other, warm_start)
     assert (same.restarts, same.status) == (2, "restarted")
-    assert shifted.value == cold.value
+    assert shifted.value == pytest.approx(cold.value)
 
 
 def test_a_warm_start_of_nans_does_no_harm(riccati):
@@ -73,12 +82,15 @@ def test_a_warm_start_of_nans_does_no_harm(riccati):
         assert solution.value == pytest.approx(exact.value, rel=1e-2)
 
 
-def test_when_it_gives_up_it_says_what_it_tried(riccati, monkeypatch):
-    monkeypatch.setattr(front, "COLD_LIMIT", 1)
+def test_when_it_gives_up_it_says_what_it_tried(monkeypatch):
+    def no_plan(_program, state, theta, *_, **__):
+        raise SolverError("fatrop found none", state, theta)
+
+    monkeypatch.setattr(Program, "solve", no_plan)
     with pytest.raises(SolverError) as caught:
-        riccati.solve(START, THETA)
+        limited(COLD_LIMIT=1).solve(START, THETA)
     assert caught.value.status.startswith(
-        "riccati found no optimum from 5 starts (the last ran out of iterations after 1 iteration"
+        "riccati found no optimum from 6 starts (the last ran out of iterations after 1 iteration"
     )
     assert "with a relative error of" in caught.value.status
     assert "in state [-2.5  1.5  0. ] with theta [1." in str(caught.value)
@@ -152,8 +164,7 @@ def test_where_nothing_can_be_compiled_plant_and_task_compute_as_before(monkeypa
 
 
 def test_only_what_is_called_from_python_is_compiled_for_it(riccati):
-    solve = front.machine_code(riccati.plant).solve
-    package = solve.__module__.rpartition(".")[0]
+    package = machine_code(riccati.problem).__module__.rpartition(".")[0]
     jitted = {
         found.__name__: found.targetoptions.get("no_cpython_wrapper", False)
         for name, module in list(sys.modules.items())
@@ -162,4 +173,4 @@ def test_only_what_is_called_from_python_is_compiled_for_it(riccati):
         if hasattr(found, "targetoptions")
     }
     assert {"factorise", "expand_stage"} < set(jitted)
-    assert {name for name, inner in jitted.items() if not inner} == {"solve", "hessian_times"}
+    assert {name for name, inner in jitted.items() if not inner} == {"find"}

@@ -32,9 +32,9 @@ def test_one_start_stands_before_a_wall_and_nine_drive_around_it():
     assert before_a_wall(9).kkt_residual(nine, relative=True) < 1e-6
 
 
-def test_a_task_has_one_start_unless_more_are_asked_for():
-    said, unsaid = (before_a_wall(k).solve(BEFORE, THETA) for k in (1, None))
-    assert_array_equal(said.point, unsaid.point)
+def test_several_starts_are_compared_unless_one_is_asked_for():
+    one, unsaid = (before_a_wall(k).solve(BEFORE, THETA) for k in (1, None))
+    assert unsaid.value < 0.97 * one.value
 
 
 def test_of_equal_plans_the_first_is_kept():
