@@ -14,16 +14,17 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.jit import load
 
 if TYPE_CHECKING:
-    import torch
+    from torch import Tensor, nn, optim
 
 TEXT = files(__package__).joinpath("dense.py").read_text("utf-8")
 NOTICE = "Compiling the network (once on this machine, a few seconds) ..."
 ACTIVATIONS = ("relu", "tanh")
-UNLIMITED = 2**62
+WEIGHTS, EXAMPLES, ORDER, COUNTS, DRAW, SCALES, RATE, SIZES = range(8)  # in a network's tuple
+UNLIMITED = 2**62  # examples
 DRAWING = threading.Lock()  # torch draws first weights from one generator a process
 
 
-def in_torch(inputs: int, hidden: int = 64, activation: str = "relu") -> "torch.nn.Sequential":
+def in_torch(inputs: int, hidden: int = 64, activation: str = "relu") -> "nn.Sequential":
     """The network in torch, with new weights."""
     from torch import float32, nn
 
@@ -34,21 +35,16 @@ def in_torch(inputs: int, hidden: int = 64, activation: str = "relu") -> "torch.
     return nn.Sequential(first, between(), second, between(), third, nn.Flatten(0))
 
 
-def fit_in_torch(
-    model: "torch.nn.Sequential",
-    adam: "torch.optim.Adam",
-    inputs: "torch.Tensor",
-    targets: "torch.Tensor",
-) -> float:
-    """One step of Adam on the loss of a mini-batch, Eq. (10); the loss before the step."""
-    loss = ((model(inputs) - targets) ** 2).mean()
+def fit_in_torch(model: "nn.Module", adam: "optim.Adam", x: "Tensor", q: "Tensor") -> float:
+    """One step of Adam on a mini-batch of inputs x and targets q, Eq. (10); the loss before it."""
+    loss = ((model(x) - q) ** 2).mean()
     adam.zero_grad()
     loss.backward()
     adam.step()
     return float(loss.detach())
 
 
-def weights_of(model: "torch.nn.Sequential") -> NDArray[np.float32]:
+def weights_of(model: "nn.Sequential") -> NDArray[np.float32]:
     """All weights of the network in torch, in the order of `dense`."""
     arrays = [each.numpy() for each in model.state_dict().values()]
     pairs = zip(arrays[::2], arrays[1::2], strict=True)
@@ -83,13 +79,13 @@ class Predictor:
     @property
     def weights(self) -> NDArray[np.float32]:
         """The weights of all layers in one vector, which may be written to."""
-        weights: NDArray[np.float32] = self.net[0][0]
+        weights: NDArray[np.float32] = self.net[WEIGHTS][0]
         return weights
 
     @property
     def fitted(self) -> bool:
         """Whether the weights have seen a fit."""
-        return bool(self.net[3][1])
+        return bool(self.net[COUNTS][1])
 
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
@@ -104,7 +100,7 @@ class Predictor:
         Raises:
             ValueError: they have another length than the network's.
         """
-        length = len(self.net[5]) - 1
+        length = len(self.net[SCALES]) - 1
         if inputs.shape[-1] != length:
             raise ValueError(f"inputs of length {inputs.shape[-1]} must have length {length}")
         return np.ascontiguousarray(inputs, float).reshape(-1, length)
@@ -113,8 +109,8 @@ class Predictor:
 class QNetwork(Predictor):
     """Inputs - 64 - 64 - 1 with ReLU, trained by Adam on a growing replay buffer: Eq. (10).
 
-    `in_torch` and `fit_in_torch` define it; `dense` computes the same in a third of the time. It
-    learns in place; a copy, or a pickle that is read, continues with the bits of the original.
+    `in_torch` and `fit_in_torch` define it; `dense` computes the same several times as fast. It
+    learns in place. A copy, or one from a pickle, continues with the bits of the original.
     Activation, initialisation (torch's own), no normalisation, an unlimited buffer and one
     mini-batch a step are this package's reading: the paper names none, and the options read it
     otherwise.  # departure H
@@ -171,12 +167,12 @@ class QNetwork(Predictor):
 
     def __len__(self) -> int:
         """How many examples are remembered."""
-        return int(min(self.net[3][0], self.net[7][2]))
+        return int(min(self.net[COUNTS][0], self.net[SIZES][2]))
 
     @property
     def ready(self) -> bool:
         """Whether the buffer holds a mini-batch, line 12 of Algorithm 1."""
-        return len(self) >= int(self.net[7][1])
+        return len(self) >= int(self.net[SIZES][1])
 
     def reserve(self, count: int) -> None:
         """Make room in `net` for so many further examples."""
@@ -203,7 +199,7 @@ class QNetwork(Predictor):
             ValueError: there are too few examples for a mini-batch.
         """
         if not self.ready:
-            batch = self.net[7][1]
+            batch = self.net[SIZES][1]
             raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
         return float(machine_code().fit(self.net))
 
