@@ -166,7 +166,7 @@ class Investigation:
 
     def is_current(self, part: str) -> bool:
         """Whether the published rows of a part are of the present epochs."""
-        return published.epochs(published.about(self.name, self.where), part) == self.epochs
+        return published.is_current(self.name, part, self.where, self.epochs)
 
     def known(self) -> pd.DataFrame:
         """The published rows of these epochs, then the rows stored here that are not published."""

@@ -89,6 +89,16 @@ def epochs(entry: Mapping[str, Any], part: str = "") -> dict[str, int]:
     return {**dict.fromkeys(EPOCHS, 1), **found[-1].get("epochs", {})} if found else {}
 
 
+def is_current(
+    name: str,
+    part: str = "",
+    where: Path | None = None,
+    present: Mapping[str, int] = EPOCHS,
+) -> bool:
+    """Whether the published rows of a part are of the present epochs."""
+    return epochs(about(name, where), part) == present
+
+
 def without(batches: Iterable[Batch], parts: Collection[str]) -> list[dict[str, Any]]:
     """The batches without these parts; a batch of which nothing is left is dropped."""
     kept = []

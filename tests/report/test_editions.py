@@ -75,16 +75,17 @@ def test_an_outcome_stands_by_its_word_and_a_number_by_its_interval(one, other, 
     assert one.stands(other) is stands
 
 
-def test_a_part_made_anew_and_what_turned_are_counted(both, monkeypatch):
+def test_a_part_made_anew_and_what_turned_are_counted(monkeypatch):
     monkeypatch.setattr(editions, "is_anew", lambda part: part == editions.MAIN)
-    now = {(one.group, one.name): one for one in both.today}
+    now = {(one.group, one.name): one for one in editions.first()}
     first, second = (("The paper's claims", name) for name in ("C1", "C2"))
     now.pop(second)
     today = [*(now | {first: Line(*first, outcome="turned")}).values()]
     again = editions.compared(today)
     turned = again[again.stands.eq(False)]
     assert [*zip(turned.group, turned.name, strict=True)] == [first, second]
-    before, counts = editions.summary(both), editions.summary(again)
+    before = editions.summary(editions.compared(editions.first()))
+    counts = editions.summary(again)
     changed = before.standing - counts.standing
     assert changed[changed != 0].to_dict() == {"The paper's claims": 2}
     assert counts.anew.to_dict()["Changing worlds"] == 0 < counts.anew["The paper's claims"] == 1

@@ -35,6 +35,8 @@ def test_a_prediction_fails_where_its_numbers_do():
 @pytest.mark.slow
 def test_published_runs_are_made_again(monkeypatch):
     """Their beginning, before differences between processors have grown."""
+    if not all(map(OTHER_PROBLEMS.is_current, ("learners", "spread"))):
+        pytest.skip("the published runs are of earlier epochs")
     found = study.runs(OTHER_PROBLEMS.table())
     known = found.courses[(found.courses.arm == "ES") & (found.courses.k == 0)].iloc[0]
     for name, short in (("STEPS", 100), ("PEER_STEPS", 3)):
