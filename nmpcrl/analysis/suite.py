@@ -28,8 +28,18 @@ from nmpcrl.analysis.encounters import count
 from nmpcrl.analysis.search import LOWER, SCALE, SEARCHES, UPPER
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.control import Nmpc, Task
-from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, policy_gradient, train
-from nmpcrl.learning.gauss_newton import TrustRegion, closed_loop, lstd_q_within
+from nmpcrl.learning import (
+    Diverged,
+    Exploration,
+    Learner,
+    Step,
+    Weights,
+    lstd_q,
+    policy_gradient,
+    train,
+)
+from nmpcrl.learning.gauss_newton import closed_loop
+from nmpcrl.learning.optimisers import TrustRegion
 from nmpcrl.learning.remedies import (
     REGULARISATION,
     averaged,
@@ -276,8 +286,9 @@ ENTRIES: Mapping[str, Entry] = {
                  lambda learner, robot, **_: averaged(learner, robot.budget * paper.STEPS // 2),
                  alpha=ALPHA),
         _learned("undone-ES", _undone(lambda learner, *_, **__: learner), alpha=ALPHA, every=1),
-        _learned("undone-LSTD-Q", _undone(lambda _, robot, radius: lstd_q_within(
-            robot.controller, TrustRegion(radius, SCALE), bounds=BOUNDS)), radius=RADIUS, every=1),
+        _learned("undone-LSTD-Q", _undone(lambda _, robot, radius: lstd_q(
+            robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS)),
+            radius=RADIUS, every=1),
         _learned("GN-J", _gn_j, radius=RADIUS),
         _learned("undone-GN-J", _undone(_gn_j), radius=RADIUS, every=1),
         _learned("DPG", lambda _, robot, radius: policy_gradient(

@@ -7,13 +7,12 @@ theta = 0 is exact. Tsitsiklis and Van Roy (1997); Sutton and Barto (2018), Sect
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.learning import NextValue, Weights, td_error
-from nmpcrl.learning.learners import UpdateRule
+from nmpcrl.learning import Learner, NextValue, Transition, UpdateRule, Weights, td_error
 
 FIRST, SECOND = 0, 1
 PHI = np.array([[1.0], [2.0]])  # features of the two states, one row a state
@@ -48,8 +47,10 @@ def sampled_step(chain: Chain, rule: UpdateRule, weights: Weights, state: int) -
     """One update in `state`."""
     here, there = (NextValue(float(phi[state] @ weights.theta), phi[state])
                    for phi in (PHI, PHI_NEXT))  # fmt: skip
-    solution: Any = here  # which has the value and the features that the rule reads
-    return rule(weights, chain.delta(weights.theta, state), solution, there)
+    nowhere, solution = np.zeros(0), cast(Any, here)  # which has the features that rules read
+    transition = Transition(nowhere, nowhere, COST, nowhere, solution)
+    learner = Learner("chain", lambda *_: there, rule, chain.gamma)
+    return learner.step(weights, transition).weights
 
 
 def expected_step(chain: Chain, rule: UpdateRule, weights: Weights) -> Weights:

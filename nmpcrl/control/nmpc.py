@@ -185,6 +185,14 @@ class Nmpc(Described):
         """
         return self._variant(solution).inputs_jacobian(solution, 0)
 
+    def policy_feedback(self, solution: Solution) -> Matrix:
+        """du_0 / ds, shape (m, n): how the policy answers to the state, by dense algebra.
+
+        Raises:
+            DerivativeError: as `policy_jacobian`.
+        """
+        return self._variant(solution).feedback(solution)
+
     def plan_jacobian(self, solution: Solution, stage: int) -> PlanJacobian:
         """The derivatives in theta of the plan's state and input of a stage, 0, ..., N.
 

@@ -1,6 +1,7 @@
 """One OCP with u_0 free or fixed: a solver that is ready for it, and its derivatives."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -77,6 +78,13 @@ class Variant:
         """d x_i / d theta, in the same way."""
         return self._rows(solution, stage, self.ocp.states)
 
+    def feedback(self, solution: Solution) -> Matrix:
+        """As `Nmpc.policy_feedback`."""
+        slopes = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
+        if self._units is None:
+            return slopes
+        return self._units.inputs[:, None] * slopes / self._units.states
+
     def _rows(self, solution: Solution, stage: int, part: Indices) -> Matrix:
         """The gradients of the plan's entries at a stage, a sweep each."""
         ocp, found = self.ocp, []
@@ -111,9 +119,20 @@ class Variant:
     def diagnosis(self) -> Diagnosis:
         return Diagnosis(self.ocp)
 
+    @property
+    def _solved(self) -> Ocp:
+        """The OCP in the units in which it is solved."""
+        return self.ocp if self._units is None else self._units.ocp
+
     @cached_property
     def _sensitivity(self) -> Sensitivity:
-        return Sensitivity(self.ocp if self._units is None else self._units.ocp)
+        return Sensitivity(self._solved)
+
+    @cached_property
+    def _in_state(self) -> Sensitivity:
+        """The derivatives in the initial state in place of theta."""
+        ocp = self._solved
+        return Sensitivity(replace(ocp, theta=ocp.parameters[: ocp.problem.states]))
 
 
 def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:

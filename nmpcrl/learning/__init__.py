@@ -11,8 +11,9 @@ from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.learning.learners import (
     Learner,
-    StatefulRule,
+    Rule,
     Update,
+    UpdateRule,
     Weights,
     deep_expected_sarsa,
     expected_sarsa,
@@ -22,7 +23,7 @@ from nmpcrl.learning.learners import (
     regularized_deep_expected_sarsa,
 )
 from nmpcrl.learning.network import QNetwork
-from nmpcrl.learning.optimisers import Adam, Descent, GaussNewton, Optimiser
+from nmpcrl.learning.optimisers import Adam, Descent, GaussNewton, Optimiser, TrustRegion
 from nmpcrl.learning.policy_gradient import policy_gradient
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import (
@@ -57,11 +58,13 @@ __all__ = [
     "Optimiser",
     "QNetwork",
     "Rollout",
+    "Rule",
     "SecondSolve",
-    "StatefulRule",
     "Step",
     "Transition",
+    "TrustRegion",
     "Update",
+    "UpdateRule",
     "Weights",
     "as_gymnasium",
     "auxiliary_step",

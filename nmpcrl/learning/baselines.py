@@ -8,26 +8,26 @@
 """
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Solution
-from nmpcrl.learning.bootstrap import Controller, NextValue, SecondSolve, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import (
     Learner,
+    Rule,
     UpdateRule,
-    Weights,
     gradient_td,
     semi_gradient,
-    theta_bounds,
+    two_solves,
 )
 from nmpcrl.learning.updates import of_length
 
 
 def frozen(nmpc: Controller) -> Learner:
     """The same exploration and the same noise, and theta never moves."""
-    return Learner("frozen", nothing, lambda weights, *_: weights, nmpc.gamma)
+    return Learner("frozen", nothing, semi_gradient(0.0), nmpc.gamma)
 
 
 def nothing(transition: Transition, theta: Vector) -> None:
@@ -37,7 +37,7 @@ def nothing(transition: Transition, theta: Vector) -> None:
 def step_matched(nmpc: Controller, alpha: float, beta: float) -> Learner:
     """ES with steps as long as those of GES: it separates direction and length."""
     rule = as_far_as(gradient_td(alpha, beta, nmpc.gamma), semi_gradient(alpha))
-    return Learner("matched", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
+    return two_solves("matched", nmpc, rule)
 
 
 def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -> Learner:
@@ -48,30 +48,27 @@ def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -
         alpha: step size of ES.
         rng: draws the directions.
     """
-    rule = as_far_as(semi_gradient(alpha), partial(_anywhere, rng))
-    return Learner("random", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
+    rule = as_far_as(semi_gradient(alpha), Rule(partial(_anywhere, rng)))
+    return two_solves("random", nmpc, rule)
 
 
-def as_far_as(length: UpdateRule, direction: UpdateRule) -> UpdateRule:
-    """Move theta where one rule would, as far as the other would, which also moves w."""
-    return partial(_as_far_as, length, direction)  # a copy of a closure shares what it draws from
+def as_far_as(length: UpdateRule, direction: UpdateRule) -> Rule:
+    """Move theta as far as `length` does, which has the memory, in the direction of another rule.
+
+    That one has no memory.
+    """
+    step = partial(_as_far_as, length, direction)  # copies its rules; a closure would share a `rng`
+    return Rule(step, length.init, length.interrupted)
 
 
 def _as_far_as(
-    length: UpdateRule,
-    direction: UpdateRule,
-    weights: Weights,
-    delta: float,
-    solution: Solution,
-    successor: NextValue,
-) -> Weights:
-    moved = length(weights, delta, solution, successor)
-    turned = direction(weights, delta, solution, successor)
-    step = of_length(
-        turned.theta - weights.theta, float(np.linalg.norm(moved.theta - weights.theta))
-    )
-    return Weights(weights.theta + step, moved.w)
+    length: UpdateRule, direction: UpdateRule,
+    theta: Vector, memory: Any, transition: Transition, delta: float, successor: NextValue,
+) -> tuple[Vector, Any]:  # fmt: skip
+    moved, after = length.step(theta, memory, transition, delta, successor)
+    turned, _ = direction.step(theta, None, transition, delta, successor)
+    return theta + of_length(turned - theta, float(np.linalg.norm(moved - theta))), after
 
 
-def _anywhere(rng: np.random.Generator, weights: Weights, *_: object) -> Weights:
-    return Weights(weights.theta + rng.normal(size=weights.theta.size), weights.w)
+def _anywhere(rng: np.random.Generator, theta: Vector, *_: Any) -> tuple[Vector, None]:
+    return theta + rng.normal(size=theta.size), None

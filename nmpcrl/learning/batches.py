@@ -1,7 +1,7 @@
 """Rules that move theta by the mean of several steps: k of them, or those of an episode.
 
-A step adds its statistics to sums, which are all that is remembered. When a batch is full, an
-estimate is made of their means, and an optimiser moves theta.
+A step adds its statistics to sums in the memory. When a batch is full, an estimate is made of their
+means, and an optimiser moves theta.
 """
 
 from collections.abc import Callable
@@ -10,59 +10,57 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmpcrl.learning.bootstrap import Controller, NextValue, SecondSolve, Transition
-from nmpcrl.learning.learners import Learner, Weights, theta_bounds
+from nmpcrl import Vector
+from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
+from nmpcrl.learning.learners import Learner, Weights, theta_bounds, two_solves, unchanged
 from nmpcrl.learning.optimisers import Bounds, GaussNewton, Optimiser
 
 Statistics = tuple[Any, ...]  # arrays
 
 
-class Memory(NamedTuple):
-    """What a `Batched` rule remembers."""
+class Batch(NamedTuple):
+    """The memory of a `Batched` rule."""
 
     steps: int  # since theta was moved
     sums: Statistics  # of their statistics; empty before the first
     optimiser: Any
 
 
-def unchanged(*means: Any) -> Statistics:
-    """The means themselves are what the optimiser takes."""
+def means_themselves(*means: Any) -> Statistics:
+    """The estimate of a batch whose statistics are gradients."""
     return means
 
 
 @dataclass(frozen=True, eq=False)
 class Batched:
-    """A `StatefulRule` that moves theta by the mean statistics of a batch."""
+    """An `UpdateRule` that moves theta by the mean statistics of a batch."""
 
     sample: Callable[[Transition, float], Statistics]  # of a step and its TD error
     optimiser: Optimiser
     every: int | None = None  # steps of a batch; those of an episode if None
-    estimate: Callable[..., Statistics] = unchanged  # of means: a gradient[, a curvature]
+    estimate: Callable[..., Statistics] = means_themselves  # of means: gradient[, curvature]
+
+    interrupted = staticmethod(unchanged)
 
     def __post_init__(self) -> None:
         if self.every is not None and self.every < 1:
             raise ValueError(f"every = {self.every} must be at least 1, or None for an episode")
 
-    def init(self, weights: Weights) -> Memory:
+    def init(self, weights: Weights) -> Batch:
         """An empty batch."""
-        return Memory(0, (), self.optimiser.init(weights.theta))
+        return Batch(0, (), self.optimiser.init(weights.theta))
 
     def step(
-        self,
-        memory: Memory,
-        weights: Weights,
-        transition: Transition,
-        delta: float,
-        successor: NextValue,
-    ) -> tuple[Weights, Memory]:
+        self, theta: Vector, memory: Batch, transition: Transition, delta: float, _: NextValue
+    ) -> tuple[Vector, Batch]:
         """Add to the sums; move theta and begin anew where the batch is full."""
         found, count = self.sample(transition, delta), memory.steps + 1
         sums = tuple(map(np.add, memory.sums, found)) if memory.sums else found
         if not (transition.last if self.every is None else count == self.every):
-            return weights, Memory(count, sums, memory.optimiser)
+            return theta, Batch(count, sums, memory.optimiser)
         estimate = self.estimate(*(one / count for one in sums))
-        theta, kept = self.optimiser.step(memory.optimiser, weights.theta, *estimate)
-        return Weights(theta, weights.w), Memory(0, (), kept)
+        theta, optimiser = self.optimiser.step(theta, memory.optimiser, *estimate)
+        return theta, Batch(0, (), optimiser)
 
 
 def batch_semi_gradient(optimiser: Optimiser, every: int | None = None) -> Batched:
@@ -83,6 +81,7 @@ def lstd_q(
     regularisation: float = 1e-3,
     curvature: bool = False,
     bounds: Bounds | None = None,
+    optimiser: Optimiser | None = None,
 ) -> Learner:
     """LSTD-Q: a Gauss-Newton step on the squared TD errors of a batch, targets held.
 
@@ -99,6 +98,8 @@ def lstd_q(
         regularisation: added to the diagonal of H.
         curvature: whether H has the Hessian of Q, which dense algebra makes at every step.
         bounds: the least and the largest theta; those of a `Problem` if absent.
+        optimiser: of g and H, such as `TrustRegion`; `GaussNewton` with the arguments above if
+            absent.
     """
 
     def sample(transition: Transition, delta: float) -> Statistics:
@@ -109,5 +110,5 @@ def lstd_q(
         return -delta * phi, hessian
 
     bounds = bounds or theta_bounds(nmpc)
-    rule = Batched(sample, GaussNewton(alpha, regularisation, bounds), every)
-    return Learner("LSTD-Q", SecondSolve(nmpc), rule, nmpc.gamma, bounds, values_actions=True)
+    rule = Batched(sample, optimiser or GaussNewton(alpha, regularisation, bounds), every)
+    return two_solves("LSTD-Q", nmpc, rule, bounds, values_actions=True)

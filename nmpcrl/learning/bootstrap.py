@@ -42,10 +42,11 @@ class NextValue:
 
 
 class Moves(NamedTuple):
-    """How a rule moves theta, where `loop` knows it: the rule's attribute `moves`."""
+    """How a rule moves theta, where `loop` knows it: `Rule.moves`."""
 
     alpha: float  # step size of theta
     beta: float | None = None  # of w, in gradient TD; None for a semi-gradient
+    gamma: float | None = None  # discount factor of gradient TD
     curvature: bool = False  # whether that is exact TDC
     projection: tuple[float, float] | None = None  # least and largest component of theta
 

@@ -1,7 +1,7 @@
 """Algorithm 1 an episode at a time, as arrays: by the compiled `loop` where it can be."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
 
@@ -175,7 +175,9 @@ class Loop:
             return None
         if trainer.controller is not nmpc or type(nmpc) is not Nmpc:
             return None
-        if learner.gamma != nmpc.gamma or (learner.bounds and moves.projection):
+        if {learner.gamma, moves.gamma or learner.gamma} != {nmpc.gamma} or (
+            learner.bounds and moves.projection
+        ):
             return None
         machine = nmpc.machine(fix_action=False)
         if machine is None:
@@ -195,11 +197,11 @@ class Loop:
 
         Returns the first step that is not made, and its state, weights and warm start.
         """
-        warm, weights, state = last.warm, last.weights, np.array(last.next_state)
-        theta, w = weights.theta.copy(), weights.w.copy()
+        warm, state = last.warm, np.array(last.next_state)
+        theta, w = last.weights.theta.copy(), last.weights.w.copy()
         point = self._machine.point_of(warm).copy()
         start = Start.SAME if warm.state.tolist() == state.tolist() else Start.SHIFTED
         done = self._episode(*self._given, int(start), first, state, theta, w, point, noise, rows)
         n, nmpc = state.size, self._nmpc
         warm = Solution(point[:n], theta, np.nan, w, 0, 0.0, point, nmpc.ocp, nmpc.solver.name)
-        return done, state, replace(weights, theta=theta, w=w), warm
+        return done, state, Weights(theta, w), warm

@@ -16,12 +16,12 @@ LSTD-Q is in `batches`, DPG in `policy_gradient`, and the control arms are in `b
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Solution
 from nmpcrl.learning.bootstrap import (
     Bootstrap,
     Controller,
@@ -47,73 +47,102 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Everything that an update rule moves."""
+    """theta, and the memory of the update rule: `Weights(theta)` begins a run."""
 
     theta: Vector  # of the NMPC, shape (d,)
-    w: Vector  # auxiliary weights of gradient TD, shape (d,)
-    memory: Any = None  # of a `StatefulRule`; None before its first step
+    w: Vector = None  # type: ignore[assignment]  # of gradient TD, shape (d,); 0 if absent
+    memory: Any = None  # of the rule; None before its first step
+
+    def __post_init__(self) -> None:
+        if self.w is None:
+            object.__setattr__(self, "w", np.zeros(np.shape(self.theta)))
 
 
-# (weights, delta, solution in s, what is known of s+) -> weights
-UpdateRule = Callable[[Weights, float, Solution, NextValue], Weights]
-
-
-class StatefulRule(Protocol):
-    """An update rule that remembers, in what it returns and nowhere else.
+class UpdateRule(Protocol):
+    """How theta moves, as an optimiser of optax: memory is an argument and a result of each step.
 
     So one learner serves many runs, and a run goes on from the weights of any of its steps.
     """
 
-    def init(self, weights: Weights) -> Any:
-        """The memory with which a run begins."""
+    def init(self, weights: Weights, /) -> Any:
+        """The memory before the first step; gradient TD begins with `weights.w`."""
 
     def step(
         self,
+        theta: Vector,
         memory: Any,
-        weights: Weights,
         transition: Transition,
         delta: float,
         successor: NextValue,
-    ) -> tuple[Weights, Any]:
-        """New weights and memory; `transition` says whether an episode begins or is over.
+        /,
+    ) -> tuple[Vector, Any]:
+        """The next theta and memory; `transition` says whether an episode begins or is over."""
 
-        A failed solve ends an episode without a last transition, and perhaps without any. A rule
-        with a method `interrupted(memory, weights)`, which returns both, is told.
-        """
+    def interrupted(self, theta: Vector, memory: Any, /) -> tuple[Vector, Any]:
+        """The same after an episode that a failed solve ended, which may have had no step."""
+
+
+def no_memory(weights: Weights) -> None:
+    """The memory of a rule without one."""
+
+
+def unchanged(theta: Vector, memory: Any) -> tuple[Vector, Any]:
+    """Learn nothing from a failed episode."""
+    return theta, memory
 
 
 @dataclass(frozen=True, eq=False)
-class Projected:
-    """A rule of either kind as a `StatefulRule` whose theta stays within the bounds."""
+class Rule:
+    """An `UpdateRule` made of functions.
 
-    rule: UpdateRule | StatefulRule
-    bounds: Bounds | None
+    >>> step = lambda theta, memory, transition, delta, successor: (theta + 0.1, memory)
+    >>> Rule(step).step(1.0, None, None, 0.0, None)
+    (1.1, None)
+    """
 
-    def init(self, weights: Weights) -> Any:
-        """The memory of the rule; None where it has none."""
-        return None if callable(self.rule) else self.rule.init(weights)
+    step: Callable[[Vector, Any, Transition, float, NextValue], tuple[Vector, Any]]
+    init: Callable[[Weights], Any] = no_memory
+    interrupted: Callable[[Vector, Any], tuple[Vector, Any]] = unchanged
 
-    def step(
-        self,
-        memory: Any,
-        weights: Weights,
-        transition: Transition,
-        delta: float,
-        successor: NextValue,
-    ) -> tuple[Weights, Any]:
-        """As the rule does, then project."""
-        if callable(self.rule):
-            moved = self.rule(weights, delta, transition.solution, successor)
-        else:
-            moved, memory = self.rule.step(memory, weights, transition, delta, successor)
-        if self.bounds is not None:
-            moved = replace(moved, theta=project(moved.theta, *self.bounds))
-        return moved, memory
+    @property
+    def moves(self) -> Moves | None:
+        """How `loop` knows the step, where it is built in."""
+        return getattr(self.step, "moves", None)
 
-    def interrupted(self, memory: Any, weights: Weights) -> tuple[Weights, Any]:
-        """Tell the rule, if it asks."""
-        tell = getattr(self.rule, "interrupted", None)
-        return tell(memory, weights) if tell else (weights, memory)
+
+def built_in(moves: Moves, step: Callable[..., Any], *first: Any) -> partial[Any]:
+    """A step with its first arguments, which `loop` knows."""
+    known = partial(step, *first)
+    vars(known)["moves"] = moves
+    return known
+
+
+class Auxiliary(NamedTuple):
+    """The memory of gradient TD."""
+
+    w: Vector  # shape (d,)
+
+
+def first_w(weights: Weights) -> Auxiliary:
+    """The memory of gradient TD before its first step."""
+    return Auxiliary(weights.w)
+
+
+def auxiliary_weights(memory: Any) -> Vector | None:
+    """w of gradient TD, in a memory or in its `inner` one; None without gradient TD."""
+    while memory is not None and not isinstance(memory, Auxiliary):
+        memory = getattr(memory, "inner", None)
+    return memory and memory.w
+
+
+def projected(rule: UpdateRule, bounds: Bounds) -> Rule:
+    """A rule whose theta is projected into bounds, (least, most), after each step."""
+    return Rule(partial(_projected, rule, bounds), rule.init, rule.interrupted)
+
+
+def _projected(rule: UpdateRule, bounds: Bounds, *given: Any) -> tuple[Vector, Any]:
+    theta, memory = rule.step(*given)
+    return project(theta, *bounds), memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +150,8 @@ class Update:
     """What one step of learning did."""
 
     weights: Weights  # after the step
-    successor: NextValue | None = None  # None when nothing was bootstrapped
-    delta: float | None = None  # TD error; None when there was none, and the weights are unchanged
+    successor: NextValue | None = None  # None where the bootstrap gave no value
+    delta: float | None = None  # TD error; None likewise, and the weights are unchanged
 
 
 @dataclass(frozen=True)
@@ -131,10 +160,16 @@ class Learner:
 
     name: str  # as tables show it
     bootstrap: Bootstrap  # values the next state
-    rule: UpdateRule | StatefulRule  # moves the weights
+    rule: UpdateRule  # moves theta
     gamma: float  # discount factor of the TD error
     bounds: Bounds | None = None  # into which theta is projected after each step
     values_actions: bool = False  # whether it is meant for Q(s, a), and not for V(s)
+
+    def __post_init__(self) -> None:
+        if not all(hasattr(self.rule, name) for name in ("init", "step", "interrupted")):
+            raise ValueError(f"rule = {self.rule!r} must have init, step and interrupted: write"
+                             " Rule(step), step(theta, memory, transition, delta, successor) ->"
+                             " (theta, memory)")  # fmt: skip
 
     def step(self, weights: Weights, transition: Transition) -> Update:
         """Value the next state, form the TD error, and move the weights.
@@ -145,22 +180,30 @@ class Learner:
         successor = self.bootstrap(transition, weights.theta)
         if successor is None:
             return Update(weights)
-        solution = transition.solution
-        delta = td_error(transition.cost, self.gamma, solution.value, successor.value)
-        rule, memory = self._remembered(weights)
-        moved, memory = rule.step(memory, weights, transition, delta, successor)
-        return Update(replace(moved, memory=memory), successor, delta)
+        delta = td_error(transition.cost, self.gamma, transition.solution.value, successor.value)
+        moved = self.bounded_rule.step(
+            weights.theta, self._memory(weights), transition, delta, successor
+        )
+        return Update(_moved(weights, *moved), successor, delta)
 
     def interrupted(self, weights: Weights) -> Weights:
         """The weights after an episode that a failed solve ended."""
-        rule, memory = self._remembered(weights)
-        moved, memory = rule.interrupted(memory, weights)
-        return replace(moved, memory=memory)
+        moved = self.bounded_rule.interrupted(weights.theta, self._memory(weights))
+        return _moved(weights, *moved)
 
-    def _remembered(self, weights: Weights) -> tuple[Projected, Any]:
-        """The projected rule, and its memory."""
-        rule = Projected(self.rule, self.bounds)
-        return rule, rule.init(weights) if weights.memory is None else weights.memory
+    @cached_property
+    def bounded_rule(self) -> UpdateRule:
+        """The rule, with the projection into the bounds where there are any."""
+        return self.rule if self.bounds is None else projected(self.rule, self.bounds)
+
+    def _memory(self, weights: Weights) -> Any:
+        return self.rule.init(weights) if weights.memory is None else weights.memory
+
+
+def _moved(before: Weights, theta: Vector, memory: Any) -> Weights:
+    """Weights whose w is that of the memory, or the one before where no rule moves it."""
+    w = auxiliary_weights(memory)
+    return Weights(theta, before.w if w is None else w, memory)
 
 
 def theta_bounds(nmpc: Any) -> Bounds | None:
@@ -171,69 +214,56 @@ def theta_bounds(nmpc: Any) -> Bounds | None:
     return problem.theta_lower, problem.theta_upper
 
 
-def semi_gradient(alpha: float) -> UpdateRule:
+def semi_gradient(alpha: float) -> Rule:
     """Eq. (9): move theta along delta phi."""
-
-    def rule(weights: Weights, delta: float, solution: Solution, _: NextValue) -> Weights:
-        return Weights(
-            semi_gradient_step(weights.theta, delta, solution.features, alpha), weights.w
-        )
-
-    vars(rule)["moves"] = Moves(alpha)
-    return rule
+    return Rule(built_in(Moves(alpha), _semi_gradient, alpha))
 
 
-def gradient_td(alpha: float, beta: float, gamma: float) -> UpdateRule:
+def _semi_gradient(
+    alpha: float, theta: Vector, memory: Any, transition: Transition, delta: float, _: NextValue
+) -> tuple[Vector, Any]:
+    return semi_gradient_step(theta, delta, transition.solution.features, alpha), memory
+
+
+def gradient_td(alpha: float, beta: float, gamma: float) -> Rule:
     """Eq. (16): move theta and w, both from the old ones."""
-
-    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
-        if successor.features is None:
-            raise ValueError(
-                "gradient TD needs the next state's features: bootstrap by SecondSolve"
-            )
-        theta, w, phi = weights.theta, weights.w, solution.features
-        return Weights(
-            theta=gradient_td_step(
-                theta, w, delta, phi, successor.features, alpha=alpha, gamma=gamma
-            ),
-            w=auxiliary_step(w, delta, phi, beta),
-        )
-
-    vars(rule)["moves"] = Moves(alpha, beta)
-    return rule
+    step = partial(_gradient_td, alpha, gamma, partial(auxiliary_step, beta=beta))
+    return Rule(built_in(Moves(alpha, beta, gamma), step), first_w)
 
 
-def exact_gradient_td(
-    nmpc: Controller,
-    alpha: float,
-    beta: float,
-    *,
-    curvature: bool,
-    projection: tuple[float, float] | None,
-) -> UpdateRule:
-    """Nonlinear TDC (Maei et al. 2009): `gradient_td` with what Eq. (16) drops.
+def tracking(alpha: float, gamma: float, follow: Callable[[Vector, float, Vector], Vector]) -> Rule:
+    """Gradient TD with any step of w: `follow` takes w, delta and phi and returns the next w."""
+    return Rule(partial(_gradient_td, alpha, gamma, follow), first_w)
 
-    Args:
-        nmpc: knows the Hessian of its value.
-        alpha: step size of theta.
-        beta: step size of w.
-        curvature: whether to subtract h, `curvature_correction`.
-        projection: least and largest value of a component of theta; None for no projection.
-    """
-    printed = gradient_td(alpha, beta, nmpc.gamma)
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
-        moved = printed(weights, delta, solution, successor)
-        theta = moved.theta
-        if curvature:
-            hessian_w = nmpc.value_hessian_times(solution, weights.w)
-            theta = theta - alpha * curvature_correction(
-                delta, solution.features, weights.w, hessian_w
-            )
-        return Weights(project(theta, *projection) if projection else theta, moved.w)
+def _gradient_td(
+    alpha: float, gamma: float, follow: Callable[[Vector, float, Vector], Vector],
+    theta: Vector, memory: Auxiliary, transition: Transition, delta: float, successor: NextValue,
+) -> tuple[Vector, Auxiliary]:  # fmt: skip
+    if successor.features is None:
+        raise ValueError("gradient TD needs the next state's features: bootstrap by SecondSolve")
+    (w,), phi = memory, transition.solution.features
+    theta = gradient_td_step(theta, w, delta, phi, successor.features, alpha=alpha, gamma=gamma)
+    return theta, Auxiliary(follow(w, delta, phi))
 
-    vars(rule)["moves"] = Moves(alpha, beta, curvature, projection)
-    return rule
+
+def _curved(
+    rule: UpdateRule, nmpc: Controller, alpha: float,
+    theta: Vector, memory: Auxiliary, transition: Transition, delta: float, successor: NextValue,
+) -> tuple[Vector, Auxiliary]:  # fmt: skip
+    """A step of gradient TD less alpha h, the curvature that Eq. (16) drops."""
+    moved, after = rule.step(theta, memory, transition, delta, successor)
+    hessian_w = nmpc.value_hessian_times(transition.solution, memory.w)
+    phi = transition.solution.features
+    return moved - alpha * curvature_correction(delta, phi, memory.w, hessian_w), after
+
+
+def two_solves(
+    name: str, nmpc: Controller, rule: UpdateRule, bounds: Bounds | None = None, **options: Any
+) -> Learner:
+    """A learner whose bootstrap is a second solve, within the bounds of a `Problem` if any."""
+    bounds = bounds or theta_bounds(nmpc)
+    return Learner(name, SecondSolve(nmpc), rule, nmpc.gamma, bounds, **options)
 
 
 def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
@@ -241,7 +271,7 @@ def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
 
     Source: Moradimaryamnegari et al. (2022).
     """
-    return Learner("ES", SecondSolve(nmpc), semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
+    return two_solves("ES", nmpc, semi_gradient(alpha))
 
 
 def deep_expected_sarsa(
@@ -268,8 +298,7 @@ def regularized_deep_expected_sarsa(
 
 def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:
     """GES, the paper's second method: two solves a step, Eq. (7), and gradient TD, Eq. (16)."""
-    rule = gradient_td(alpha, beta, nmpc.gamma)
-    return Learner("GES", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
+    return two_solves("GES", nmpc, gradient_td(alpha, beta, nmpc.gamma))
 
 
 def gradient_tdc(
@@ -280,12 +309,22 @@ def gradient_tdc(
     curvature: bool = True,
     projection: tuple[float, float] | None = None,
 ) -> Learner:
-    """TDC, exact nonlinear gradient TD: two solves a step and a product with the value's Hessian.
+    """TDC, nonlinear gradient TD (Maei et al. 2009): GES with what Eq. (16) drops.
 
-    Arguments as in `exact_gradient_td`; without curvature and projection it is GES.
+    Args:
+        nmpc: knows the Hessian of its value.
+        alpha: step size of theta.
+        beta: step size of w.
+        curvature: whether to subtract alpha h, `curvature_correction`, a product with the Hessian.
+        projection: least and largest value of a component of theta; None for no projection.
     """
-    rule = exact_gradient_td(nmpc, alpha, beta, curvature=curvature, projection=projection)
-    return Learner("TDC", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
+    rule = gradient_td(alpha, beta, nmpc.gamma)
+    if curvature:
+        rule = replace(rule, step=partial(_curved, rule, nmpc, alpha))
+    if projection:
+        rule = projected(rule, projection)
+    moves = Moves(alpha, beta, nmpc.gamma, curvature, projection)
+    return two_solves("TDC", nmpc, replace(rule, step=built_in(moves, rule.step)))
 
 
 def q_learning(nmpc: Controller, alpha: float) -> Learner:
@@ -295,5 +334,4 @@ def q_learning(nmpc: Controller, alpha: float) -> Learner:
     `train` has it for this learner. In the next state the policy minimises Q, so its value is
     V_theta(s+): a solve with u_0 free.
     """
-    rule, bounds = semi_gradient(alpha), theta_bounds(nmpc)
-    return Learner("QL", SecondSolve(nmpc), rule, nmpc.gamma, bounds, values_actions=True)
+    return two_solves("QL", nmpc, semi_gradient(alpha), values_actions=True)

@@ -1,4 +1,4 @@
-"""How far a step goes, given a gradient: what rules with a memory hand their estimates to."""
+"""Optimisers: how far a step of theta goes, given a gradient and perhaps a curvature."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
@@ -10,18 +10,20 @@ from nmpcrl import Matrix, Vector
 
 Bounds = tuple[Vector, Vector]  # the least and the largest theta
 ROUNDING = 1e-12  # of a matrix that is added to it before it is factorised
+HALVINGS = 60  # of the interval in which the multiplier of a trust region lies
+LEAST = 1e-12  # curvature in a trust region, in parts of the largest
 
 
 class Optimiser(Protocol):
-    """Moves theta downhill; what it remembers goes in and comes out."""
+    """Moves theta downhill; its memory is an argument and a result of each step."""
 
     def init(self, theta: Vector) -> Any:
         """The memory before the first step."""
 
     def step(
-        self, memory: Any, theta: Vector, gradient: Vector, curvature: Matrix | None = None
+        self, theta: Vector, memory: Any, gradient: Vector, curvature: Matrix | None = None
     ) -> tuple[Vector, Any]:
-        """The next theta and memory; only `GaussNewton` asks for the curvature, shape (d, d)."""
+        """The next theta and memory; the curvature, shape (d, d), is for those of second order."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Descent:
         return np.zeros_like(theta)
 
     def step(
-        self, memory: Vector, theta: Vector, gradient: Vector, curvature: Matrix | None = None
+        self, theta: Vector, memory: Vector, gradient: Vector, curvature: Matrix | None = None
     ) -> tuple[Vector, Vector]:
         """The two equations above."""
         velocity = self.momentum * memory - self.alpha * gradient
@@ -47,7 +49,7 @@ class Descent:
 
 
 class Moments(NamedTuple):
-    """What `Adam` remembers."""
+    """The memory of `Adam`."""
 
     mean: Vector  # m, of the gradients
     square: Vector  # v, of their squares
@@ -74,7 +76,7 @@ class Adam:
         return Moments(np.zeros_like(theta), np.zeros_like(theta))
 
     def step(
-        self, memory: Moments, theta: Vector, gradient: Vector, curvature: Matrix | None = None
+        self, theta: Vector, memory: Moments, gradient: Vector, curvature: Matrix | None = None
     ) -> tuple[Vector, Moments]:
         """The three equations above."""
         t = memory.steps + 1
@@ -84,8 +86,34 @@ class Adam:
         return theta - self.alpha * (m / (1 - self.b1**t)) / size, Moments(m, v, t)
 
 
+class SecondOrder:
+    """An optimiser without memory that minimises a model with the curvature H, shape (d, d)."""
+
+    def init(self, theta: Vector) -> None:
+        """No memory."""
+
+    def step(
+        self, theta: Vector, memory: None, gradient: Vector, curvature: Matrix | None = None
+    ) -> tuple[Vector, None]:
+        """theta + p with the p of the class.
+
+        Raises:
+            ValueError: there is no curvature.
+        """
+        if curvature is None:
+            name = type(self).__name__
+            raise ValueError(f"{name} needs a curvature, and this rule estimates none")
+        if not np.isfinite(curvature).all():
+            return np.full_like(theta, np.inf), None  # which `train` calls diverged
+        return theta + self._change(theta, gradient, curvature), None
+
+    def _change(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
+        """p."""
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, eq=False)
-class GaussNewton:
+class GaussNewton(SecondOrder):
     """theta + p, where p is least in alpha g'p + p'H p / 2 and theta + p within the bounds.
 
     H is the curvature plus `regularisation` on its diagonal, and as much more as makes it positive
@@ -96,28 +124,44 @@ class GaussNewton:
     regularisation: float = 1e-3  # in the unit of the curvature
     bounds: Bounds | None = None
 
-    def init(self, theta: Vector) -> None:
-        """It remembers nothing."""
-
-    def step(
-        self, memory: None, theta: Vector, gradient: Vector, curvature: Matrix | None = None
-    ) -> tuple[Vector, None]:
-        """The minimiser.
-
-        Raises:
-            ValueError: there is no curvature.
-        """
-        if curvature is None:
-            raise ValueError("GaussNewton needs a curvature, and this rule estimates none")
-        if not np.isfinite(curvature).all():
-            return np.full_like(theta, np.inf), None  # which `train` calls diverged
+    def _change(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
         least = float(np.linalg.eigvalsh(curvature)[0])
         L = _factor(curvature, self.regularisation + max(0.0, -least))
         slope = np.linalg.solve(L, -self.alpha * gradient)
-        p: Any = np.linalg.solve(L.T, slope)
-        if self.bounds is not None:
-            p = _within(p, L, slope, self.bounds[0] - theta, self.bounds[1] - theta)
-        return theta + p, None
+        p = np.asarray(np.linalg.solve(L.T, slope))
+        if self.bounds is None:
+            return p
+        return _within(p, L, slope, self.bounds[0] - theta, self.bounds[1] - theta)
+
+
+@dataclass(frozen=True, eq=False)
+class TrustRegion(SecondOrder):
+    """theta + p, where p is least in g'p + p'H p / 2 and ||p / scale|| at most `radius`.
+
+    Where the region binds, (H + mu S^-2) p = -g with the mu > 0 that puts p on its edge; H may be
+    indefinite.  Source: Moré and Sorensen (1983).
+    """
+
+    radius: float
+    scale: Vector  # a typical change of each component of theta, shape (d,)
+
+    def _change(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
+        values, basis = np.linalg.eigh(curvature * np.outer(self.scale, self.scale))
+        slope = basis.T @ (self.scale * gradient)
+        return -self.scale * (basis @ self._within(values, slope))
+
+    def _within(self, values: Vector, slope: Vector) -> Vector:
+        """slope / (values + mu) with the least mu >= 0 that makes it convex and short enough."""
+        floor = LEAST * max(1.0, float(np.abs(values).max()))
+        low = max(0.0, floor - float(values[0]))
+        if np.linalg.norm(slope / (values + low)) <= self.radius:
+            return np.asarray(slope / (values + low))
+        high = low + float(np.linalg.norm(slope)) / self.radius
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            short = np.linalg.norm(slope / (values + middle)) <= self.radius
+            low, high = (low, middle) if short else (middle, high)
+        return np.asarray(slope / (values + high))
 
 
 def _factor(H: Matrix, more: float) -> Any:

@@ -14,20 +14,23 @@ Gauss-Newton steps are in `gauss_newton`, the deterministic policy gradient in `
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 from nmpcrl import Vector
-from nmpcrl.control import Solution
 from nmpcrl.learning.baselines import as_far_as
-from nmpcrl.learning.bootstrap import Controller, NextValue, SecondSolve, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import (
     Learner,
-    Projected,
+    Rule,
     UpdateRule,
     Weights,
-    gradient_td,
+    auxiliary_weights,
+    first_w,
+    no_memory,
     semi_gradient,
-    theta_bounds,
+    tracking,
+    two_solves,
 )
 from nmpcrl.learning.updates import auxiliary_step
 
@@ -59,33 +62,14 @@ def tdrc(nmpc: Controller, alpha: float, regularisation: float = REGULARISATION)
     Source: Ghiassian et al. (2020).  Their features are of unit size: where ||phi||^2 is large, a
     regularisation of 1 does next to nothing. On the two-state chain one above 2 gamma - 1 diverges.
     """
-
-    def follow(w: Vector, delta: float, phi: Vector) -> Vector:
-        return regularised_step(w, delta, phi, alpha, regularisation)
-
-    return _gradient_learner("TDRC", nmpc, alpha, follow)
+    follow = partial(regularised_step, alpha=alpha, decay=regularisation)
+    return two_solves("TDRC", nmpc, tracking(alpha, nmpc.gamma, follow))
 
 
 def normalised_ges(nmpc: Controller, alpha: float, ratio: float = 3.0) -> Learner:
     """GES-3: w moves faster than theta, as two-time-scale theory asks, by `normalised_step`."""
-
-    def follow(w: Vector, delta: float, phi: Vector) -> Vector:
-        return normalised_step(w, delta, phi, ratio * alpha)
-
-    return _gradient_learner("GES-3", nmpc, alpha, follow)
-
-
-def _gradient_learner(
-    name: str, nmpc: Controller, alpha: float, follow: Callable[[Vector, float, Vector], Vector]
-) -> Learner:
-    """GES with another step of w, from the old one as in Eq. (16)."""
-    printed = gradient_td(alpha, 0.0, nmpc.gamma)
-
-    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
-        moved = printed(weights, delta, solution, successor)
-        return replace(moved, w=follow(weights.w, delta, solution.features))
-
-    return Learner(name, SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
+    follow = partial(normalised_step, beta=ratio * alpha)
+    return two_solves("GES-3", nmpc, tracking(alpha, nmpc.gamma, follow))
 
 
 def guarded(learner: Learner, alpha: float) -> Learner:
@@ -94,33 +78,36 @@ def guarded(learner: Learner, alpha: float) -> Learner:
     Raises:
         ValueError: its rule is not proportional to alpha, since it moves theta by batches.
     """
-    own = _plain_rule(learner, "a guard")
+    rule = _of_each_step(learner, "a guard")
+    own = replace(rule, step=partial(_guarded, rule, alpha))
+    return replace(learner, name=f"{learner.name} guarded", rule=own)
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
-        moved, allowed = own(weights, delta, solution, successor), guard(alpha, solution.features)
-        if allowed == alpha:
-            return moved
-        part = allowed / alpha
-        return replace(moved, theta=weights.theta + part * (moved.theta - weights.theta))
 
-    return replace(learner, name=f"{learner.name} guarded", rule=rule)
+def _guarded(
+    rule: UpdateRule, alpha: float, theta: Vector, memory: Any, transition: Transition, *given: Any
+) -> tuple[Vector, Any]:
+    moved, after = rule.step(theta, memory, transition, *given)
+    allowed = guard(alpha, transition.solution.features)
+    return moved if allowed == alpha else theta + allowed / alpha * (moved - theta), after
 
 
 def directed(learner: Learner, alpha: float) -> Learner:
     """The control of a remedy: its lengths, in the direction of ES, which has step size alpha."""
-    rule = as_far_as(_plain_rule(learner, "this control"), semi_gradient(alpha))
+    rule = as_far_as(_of_each_step(learner, "this control"), semi_gradient(alpha))
     return replace(learner, name=f"{learner.name} directed", rule=rule)
 
 
-def _plain_rule(learner: Learner, who: str) -> UpdateRule:
-    if not callable(learner.rule):
+def _of_each_step(learner: Learner, who: str) -> Rule:
+    """The rule of a learner, which has no memory but w."""
+    rule = learner.rule
+    if not isinstance(rule, Rule) or rule.init not in (no_memory, first_w):
         raise ValueError(f"{who} needs a rule that moves theta at every step; {learner.name} has a"
                          " memory")  # fmt: skip
-    return learner.rule
+    return rule
 
 
 class Mean(NamedTuple):
-    """What `Averaging` remembers."""
+    """The memory of `Averaging`."""
 
     theta: Vector  # the mean
     steps: int  # in all
@@ -129,44 +116,41 @@ class Mean(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Averaging:
-    """A `StatefulRule` that leaves a rule as it is and keeps the mean of its theta.
+    """An `UpdateRule` that moves theta as another does and remembers the mean of its theta.
 
     Source: Polyak and Juditsky (1992).
     """
 
-    rule: Projected
+    rule: UpdateRule
     skip: int = 0  # steps before the mean begins
 
     def init(self, weights: Weights) -> Mean:
         """The mean of one theta."""
         return Mean(weights.theta, 0, self.rule.init(weights))
 
-    def step(
-        self, memory: Mean, weights: Weights, transition: Transition, delta: float, then: NextValue
-    ) -> tuple[Weights, Mean]:
+    def step(self, theta: Vector, memory: Mean, *given: Any) -> tuple[Vector, Mean]:
         """mean <- mean + (theta - mean) / n; until n = 1, the mean is theta."""
-        moved, inner = self.rule.step(memory.inner, weights, transition, delta, then)
+        theta, inner = self.rule.step(theta, memory.inner, *given)
         steps = memory.steps + 1
         part = 1 / max(steps - self.skip, 1)
-        return moved, Mean(memory.theta + part * (moved.theta - memory.theta), steps, inner)
+        return theta, Mean(memory.theta + part * (theta - memory.theta), steps, inner)
 
-    def interrupted(self, memory: Mean, weights: Weights) -> tuple[Weights, Mean]:
-        """Tell the rule."""
-        moved, inner = self.rule.interrupted(memory.inner, weights)
-        return moved, memory._replace(inner=inner)
+    def interrupted(self, theta: Vector, memory: Mean) -> tuple[Vector, Mean]:
+        """As the rule."""
+        theta, inner = self.rule.interrupted(theta, memory.inner)
+        return theta, memory._replace(inner=inner)
 
 
 def averaged(learner: Learner, skip: int = 0) -> Learner:
     """A learner that keeps the mean of its theta, which `judged_theta` returns."""
-    rule = Averaging(Projected(learner.rule, learner.bounds), skip)
+    rule = Averaging(learner.bounded_rule, skip)
     return replace(learner, name=f"{learner.name} averaged", rule=rule)
 
 
 class Best(NamedTuple):
-    """What `Undoing` remembers."""
+    """The memory of `Undoing`."""
 
-    theta: Vector  # with the lowest cost
-    w: Vector  # with it
+    weights: Weights  # theta with the lowest cost, and its w
     cost: float
     episodes: int
     inner: Any
@@ -174,54 +158,55 @@ class Best(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Undoing:
-    """A `StatefulRule` that goes back to the best theta where a confirming rollout got worse.
+    """An `UpdateRule` that goes back to the best theta where a confirming rollout got worse.
 
     It begins with a rollout of the first theta, and makes one after every `every` episodes, those
-    that a failed solve ended among them. What a rollout cannot judge costs infinitely much. After a
-    step back the rule begins anew.
+    that a failed solve ended among them. A rollout that fails costs infinitely much. After a step
+    back the rule begins anew.
     """
 
-    rule: Projected
+    rule: UpdateRule
     confirm: Callable[[Vector], float]  # theta -> cost without noise; each call is interaction
     every: int = 1  # episodes
 
     def init(self, weights: Weights) -> Best:
         """The first rollout."""
-        cost = self.confirm(weights.theta)
-        return Best(weights.theta, weights.w, cost, 0, self.rule.init(weights))
+        return Best(weights, self.confirm(weights.theta), 0, self.rule.init(weights))
 
     def step(
-        self, memory: Best, weights: Weights, transition: Transition, delta: float, then: NextValue
-    ) -> tuple[Weights, Best]:
-        """Move as the rule does; judge that at the end of an episode."""
-        moved, inner = self.rule.step(memory.inner, weights, transition, delta, then)
+        self, theta: Vector, memory: Best, transition: Transition, delta: float, then: NextValue
+    ) -> tuple[Vector, Best]:
+        """Move as the rule does; judge theta at the end of an episode."""
+        theta, inner = self.rule.step(theta, memory.inner, transition, delta, then)
         memory = memory._replace(inner=inner)
-        return self._judged(memory, moved) if transition.last else (moved, memory)
+        return self._judged(theta, memory) if transition.last else (theta, memory)
 
-    def interrupted(self, memory: Best, weights: Weights) -> tuple[Weights, Best]:
+    def interrupted(self, theta: Vector, memory: Best) -> tuple[Vector, Best]:
         """As at the end of any other episode."""
-        moved, inner = self.rule.interrupted(memory.inner, weights)
-        return self._judged(memory._replace(inner=inner), moved)
+        theta, inner = self.rule.interrupted(theta, memory.inner)
+        return self._judged(theta, memory._replace(inner=inner))
 
-    def _judged(self, memory: Best, moved: Weights) -> tuple[Weights, Best]:
-        """After `every` episodes keep the weights, or go back."""
+    def _judged(self, theta: Vector, memory: Best) -> tuple[Vector, Best]:
+        """After `every` episodes keep theta, or go back."""
         memory = memory._replace(episodes=memory.episodes + 1)
         if memory.episodes % self.every:
-            return moved, memory
-        cost = self.confirm(moved.theta)
+            return theta, memory
+        cost = self.confirm(theta)
         if cost <= memory.cost:
-            return moved, memory._replace(theta=moved.theta, w=moved.w, cost=cost)
-        back = Weights(memory.theta, memory.w)
-        return back, memory._replace(inner=self.rule.init(back))
+            best = Weights(theta, auxiliary_weights(memory.inner))
+            return theta, memory._replace(weights=best, cost=cost)
+        return memory.weights.theta, memory._replace(inner=self.rule.init(memory.weights))
 
 
 def undo(learner: Learner, confirm: Callable[[Vector], float], every: int = 1) -> Learner:
-    """A learner that takes back what a rollout without noise finds worse: see `Undoing`."""
-    rule = Undoing(Projected(learner.rule, learner.bounds), confirm, every)
+    """A learner that takes back steps after which a rollout without noise costs more: `Undoing`."""
+    rule = Undoing(learner.bounded_rule, confirm, every)
     return replace(learner, name=f"{learner.name} undone", rule=rule)
 
 
 def judged_theta(weights: Weights) -> Vector:
-    """The theta that a learner stands for: the mean, or the best, where its rule keeps one."""
-    kept = weights.memory
-    return kept.theta if isinstance(kept, Mean | Best) else weights.theta
+    """The theta that a learner stands for: the mean, or the best, where its rule has one."""
+    memory = weights.memory
+    if isinstance(memory, Best):
+        return memory.weights.theta
+    return memory.theta if isinstance(memory, Mean) else weights.theta

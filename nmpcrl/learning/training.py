@@ -287,7 +287,7 @@ def trainer_of(
     if nmpc is None:
         raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
     if not isinstance(weights, Weights):
-        raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta, 0 * theta)")
+        raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta)")
     if explore.noise.shape[2] != nmpc.m:
         raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
                          f" {nmpc.m} inputs")  # fmt: skip

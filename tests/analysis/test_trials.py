@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.trials import evaluations, final_costs, summarise
-from nmpcrl.learning import Learner, SecondSolve, Weights, evaluate, expected_sarsa, frozen
+from nmpcrl.learning import Learner, Rule, SecondSolve, evaluate, expected_sarsa, frozen
 from nmpcrl.study import Trial, paper, run
 
 THETA = paper.THETA_INIT
@@ -36,11 +36,11 @@ def test_a_frozen_theta_costs_the_same_whenever_it_is_judged_and_at_the_end(nmpc
 def lost(nmpc, at):
     steps = []
 
-    def rule(weights, *_):
+    def step(theta, memory, *_):
         steps.append(1)
-        return Weights(weights.theta * (np.nan if len(steps) == at else 1), weights.w)
+        return theta * (np.nan if len(steps) == at else 1), memory
 
-    return Learner("lost", SecondSolve(nmpc), rule, nmpc.gamma)
+    return Learner("lost", SecondSolve(nmpc), Rule(step), nmpc.gamma)
 
 
 @pytest.mark.parametrize("at", [1, STEPS])

@@ -25,6 +25,7 @@ from nmpcrl.learning import (
 from nmpcrl.learning.episode import NUMBERS, Loop, episodes
 from nmpcrl.learning.loop import FIND, SLOPES
 from nmpcrl.learning.loop import NUMBERS as OF_LOOP
+from nmpcrl.learning.remedies import guarded
 from nmpcrl.learning.training import trainer_of
 from nmpcrl.study import paper
 
@@ -222,11 +223,7 @@ def test_weights_that_leave_all_numbers_are_a_divergence_in_both(nmpc, make, wha
         lambda nmpc: {"make": lambda n: dataclasses.replace(frozen(n), gamma=0.5)},
         lambda nmpc: {"plant": lambda s, a, _: (nmpc.plant.step(s, a), 1.0, False)},
         lambda nmpc: {"nmpc": paper.nmpc(solver="fatrop")},
-        lambda nmpc: {
-            "make": lambda n: dataclasses.replace(
-                expected_sarsa(n, 1e-7), rule=lambda weights, *_: weights
-            )
-        },
+        lambda nmpc: {"make": lambda n: guarded(gradient_expected_sarsa(n, 1e-6, 1e-7), 1e-6)},
     ],
     ids=["gamma", "plant", "solver", "rule"],
 )

@@ -4,32 +4,45 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize
 
-from nmpcrl.learning import Adam, Descent, GaussNewton
+from nmpcrl.learning import Adam, Descent, GaussNewton, TrustRegion
 
 THETA, GRADIENT = np.array([1.0, -2.0]), np.array([0.5, 3.0])
+CURVATURE = np.array([[2.0, 0.5], [0.5, 1.0]])
+EDGE = np.array([1.0, -10.0]), np.array([1.0, 10.0])  # holds the first component in place
 
 
 def moved(optimiser, theta=THETA, gradients=(GRADIENT,), curvature=None):
     memory = optimiser.init(theta)
     for gradient in gradients:
-        theta, memory = optimiser.step(memory, theta, gradient, curvature)
+        theta, memory = optimiser.step(theta, memory, gradient, curvature)
     return theta
 
 
-def test_descent_follows_the_gradient():
-    np.testing.assert_allclose(moved(Descent(0.1)), THETA - 0.1 * GRADIENT)
+def drawn(seed, *, convex=True):
+    """A gradient and a curvature of three parameters, and the generator for more."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3, 3))
+    return rng.normal(size=3), A @ A.T + 0.1 * np.eye(3) if convex else A + A.T, rng
 
 
-def test_a_heavy_ball_keeps_part_of_its_velocity():
-    twice = moved(Descent(0.1, momentum=0.5), gradients=(GRADIENT, GRADIENT))
-    np.testing.assert_allclose(twice, THETA - 0.1 * GRADIENT - 0.15 * GRADIENT)
-
-
-def test_the_first_step_of_adam_has_the_length_alpha_in_each_component():
-    np.testing.assert_allclose(moved(Adam(0.1)), THETA - 0.1 * np.sign(GRADIENT), atol=1e-8)
+@pytest.mark.parametrize(
+    ("optimiser", "steps", "by_hand"),
+    [
+        (Descent(0.1), 1, -0.1 * GRADIENT),
+        (Descent(0.1, momentum=0.5), 2, -0.25 * GRADIENT),
+        (Adam(0.1), 1, -0.1 * np.sign(GRADIENT)),
+        (GaussNewton(0.7, 0.1), 1, -0.7 * np.linalg.solve(CURVATURE + 0.1 * np.eye(2), GRADIENT)),
+        (GaussNewton(1.0, 0.0, EDGE), 1, [0.0, -3.0]),
+        (TrustRegion(1e6, np.array([2.0, 0.1])), 1, -np.linalg.solve(CURVATURE, GRADIENT)),
+    ],
+)
+def test_steps_by_hand(optimiser, steps, by_hand):
+    found = moved(optimiser, gradients=[GRADIENT] * steps, curvature=CURVATURE)
+    np.testing.assert_allclose(found, THETA + by_hand, atol=1e-8)
 
 
 def test_adam_is_that_of_torch():
@@ -43,32 +56,22 @@ def test_adam_is_that_of_torch():
     np.testing.assert_allclose(moved(Adam(0.05), gradients=gradients), theta.detach(), rtol=1e-10)
 
 
-def test_a_gauss_newton_step_solves_with_the_curvature():
-    curvature = np.array([[2.0, 0.5], [0.5, 1.0]])
-    expected = THETA - 0.7 * np.linalg.solve(curvature + 0.1 * np.eye(2), GRADIENT)
-    optimiser = GaussNewton(0.7, regularisation=0.1)
-    np.testing.assert_allclose(moved(optimiser, curvature=curvature), expected)
-
-
-def test_an_indefinite_curvature_still_gives_a_descent():
-    curvature = np.diag([1.0, -4.0])
-    step = moved(GaussNewton(), curvature=curvature) - THETA
-    assert step @ GRADIENT < 0
-
-
-def test_gauss_newton_says_that_it_needs_a_curvature():
+@pytest.mark.parametrize("optimiser", [GaussNewton(), TrustRegion(1.0, np.ones(2))])
+def test_the_second_order_needs_a_curvature_that_is_finite_and_may_be_indefinite(optimiser):
     with pytest.raises(ValueError, match="needs a curvature, and this rule estimates none"):
-        moved(GaussNewton())
+        moved(optimiser)
+    assert (moved(optimiser, curvature=np.diag([1.0, -4.0])) - THETA) @ GRADIENT < 0
+    assert not np.isfinite(moved(optimiser, curvature=np.full((2, 2), np.nan))).any()
+    rank_one = 1e20 * np.outer(GRADIENT, GRADIENT)
+    assert np.isfinite(moved(optimiser, gradients=[1e20 * GRADIENT], curvature=rank_one)).all()
 
 
 @given(st.integers(0, 10_000))
 def test_a_bounded_step_is_the_least_of_the_quadratic_within_the_bounds(seed):
-    rng = np.random.default_rng(seed)
-    root, theta, gradient = rng.normal(size=(3, 3)), rng.normal(size=3), rng.normal(size=3)
-    H = root @ root.T + 0.1 * np.eye(3)
+    gradient, H, rng = drawn(seed)
+    theta = rng.normal(size=3)
     lower, upper = theta - rng.uniform(0, 1, 3), theta + rng.uniform(0, 1, 3)
-    bounds = (lower, upper)
-    found = moved(GaussNewton(1.0, 0.0, bounds), theta, (gradient,), H)
+    found = moved(GaussNewton(1.0, 0.0, (lower, upper)), theta, (gradient,), H)
     least = np.inf
     for sides in product((lower, theta, upper), repeat=3):  # each held at a bound, or free
         p = np.array([side[k] for k, side in enumerate(sides)]) - theta
@@ -80,19 +83,19 @@ def test_a_bounded_step_is_the_least_of_the_quadratic_within_the_bounds(seed):
     np.testing.assert_allclose(found, best, atol=1e-9)
 
 
-def test_a_component_whose_bounds_are_one_stays_there():
-    bounds = (np.array([1.0, -10.0]), np.array([1.0, 10.0]))
-    curvature = np.array([[2.0, 0.5], [0.5, 1.0]])
-    np.testing.assert_allclose(
-        moved(GaussNewton(1.0, 0.0, bounds), curvature=curvature), [1.0, -2.0 - 3.0]
-    )
+@given(st.integers(0, 1000), st.booleans(), st.floats(0.01, 2))
+@settings(max_examples=60)
+def test_a_step_in_a_trust_region_is_the_least_of_its_model(seed, convex, radius):
+    gradient, H, rng = drawn(seed, convex=convex)
+    scale, theta = rng.uniform(0.2, 3, 3), np.ones(3)
+    p = moved(TrustRegion(radius, scale), theta, (gradient,), H) - theta
 
+    def model(q):
+        return gradient @ (scale * q) + (scale * q) @ H @ (scale * q) / 2
 
-def test_gauss_newton_takes_a_curvature_of_any_size_and_infinity_as_divergence():
-    rng = np.random.default_rng(3)
-    phi = rng.normal(size=(2, 5))
-    theta, step = np.zeros(5), GaussNewton().step
-    moved, _ = step(None, theta, 1e20 * phi[0], 1e20 * phi.T @ phi)
-    assert np.isfinite(moved).all()
-    moved, _ = step(None, theta, phi[0], np.full((5, 5), np.inf))
-    assert not np.isfinite(moved).any()
+    assert np.linalg.norm(p / scale) <= radius * (1 + 1e-9)
+    inside = {"type": "ineq", "fun": lambda q: radius**2 - q @ q, "jac": lambda q: -2 * q}
+    starts = rng.normal(size=(4, 3))
+    others = [minimize(model, radius * q / np.linalg.norm(q), constraints=[inside]) for q in starts]
+    least = min(one.fun for one in others if one.success)  # which may lie a little outside
+    assert model(p / scale) <= least + 1e-3 * abs(least) + 1e-6

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
-from nmpcrl.learning import Weights, expected_sarsa, frozen, q_learning
+from nmpcrl.learning import Rule, Weights, expected_sarsa, frozen, q_learning
+from nmpcrl.learning.learners import Auxiliary, first_w
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import (
     PATIENCE,
@@ -147,7 +148,7 @@ def test_noise_for_another_number_of_inputs_is_refused(sound):
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
-        (THETA, {}, r"weights = array.* must be Weights: write Weights\(theta, 0 \* theta\)"),
+        (THETA, {}, r"weights = array.* must be Weights: write Weights\(theta\)"),
         (None, {"clipped": False}, r"clipped = False .* \[0.6    1.5708\].* QL has no Q\(s, a\)"),
         (None, {"controller": 5}, "controller = 5 must be an Nmpc"),
     ],
@@ -160,12 +161,12 @@ def test_what_cannot_be_trained_is_refused_at_the_call(sound, given, options, me
 
 
 def test_weights_may_be_lists_and_are_left_as_they_are(sound):
-    def in_place(weights, delta, *_):
-        weights.theta[:] += 1.0
-        return weights
+    def in_place(theta, memory, *_):
+        theta[:] += 1.0
+        return theta, memory
 
     given = Weights(THETA.tolist(), [0.0] * 9)
-    learner = dataclasses.replace(es(sound), rule=in_place)
+    learner = dataclasses.replace(es(sound), rule=Rule(in_place))
     *_, last = train(learner, sound, given, noisy(1, 3))
     np.testing.assert_array_equal(last.weights.theta, THETA + 3)
     assert given.theta == THETA.tolist()
@@ -272,12 +273,12 @@ def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing)
         def init(self, weights):
             return None
 
-        def step(self, memory, weights, transition, delta, successor):
+        def step(self, theta, memory, transition, delta, successor):
             told.append(transition.first)
-            return weights, memory
+            return theta, memory
 
-        def interrupted(self, memory, weights):
-            return dataclasses.replace(weights, theta=1.01 * weights.theta), memory
+        def interrupted(self, theta, memory):
+            return 1.01 * theta, memory
 
     controller = Faulty(lambda call: call == failing)
     steps = training(controller, quiet(2, 3), lambda c: dataclasses.replace(es(c), rule=Told()))
@@ -303,28 +304,25 @@ def test_ten_failed_episodes_not_in_a_row_are_none():
     assert places(steps)[-1] == (18, 0)
 
 
-def leap(vector_of_weights):
-    """A learner that replaces the weights in its third step."""
+def leap(spoil):
+    """A learner that spoils theta and w in its third step."""
     count = 0
 
-    def make(controller):
-        def rule(weights, *_):
-            nonlocal count
-            count += 1
-            return vector_of_weights(weights) if count == 3 else weights
+    def step(theta, memory, *_):
+        nonlocal count
+        count += 1
+        return spoil(theta, memory) if count == 3 else (theta, memory)
 
-        return dataclasses.replace(es(controller), rule=rule)
-
-    return make
+    return lambda controller: dataclasses.replace(es(controller), rule=Rule(step, first_w))
 
 
 @pytest.mark.parametrize("absurd", [np.nan, np.inf, -1e7])
 @pytest.mark.parametrize("name", ["theta", "w"])
 def test_weights_that_are_not_numbers_or_absurd_are_a_divergence(sound, name, absurd):
-    def spoil(weights):
-        vector = getattr(weights, name).copy()
-        vector[4] = absurd
-        return dataclasses.replace(weights, **{name: vector})
+    def spoil(theta, memory):
+        spoiled = {"theta": theta.copy(), "w": memory.w.copy()}
+        spoiled[name][4] = absurd
+        return spoiled["theta"], Auxiliary(spoiled["w"])
 
     steps = []
     with pytest.raises(Diverged, match=rf"(?s)^{name} .*left the numbers"):
