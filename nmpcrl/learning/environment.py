@@ -14,7 +14,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Plant
+from nmpcrl.control import Nmpc, Plant, Task
 from nmpcrl.control.blocks import numbers
 from nmpcrl.control.expression import mismatch
 from nmpcrl.control.solution import short
@@ -22,7 +22,7 @@ from nmpcrl.control.solution import short
 # next state, cost l(s, a), whether the episode ends there, and whether only its time does
 Step = tuple[Vector, float, bool, bool]
 StepFunction = Callable[[Vector, Vector, np.random.Generator], tuple[Any, ...]]
-# what is known at a time of an episode: of each, or one array a name with a time for each
+# of a `Problem`: a function of the time, or by name an array over the times of an episode
 Data = Callable[[int], Mapping[str, Any]] | Mapping[str, Any]
 Start = Vector | Callable[[np.random.Generator], Vector]
 
@@ -75,56 +75,56 @@ def environment(
     """
     if is_gymnasium(plant):
         return of_gymnasium(cast(GymnasiumEnv, plant), nmpc, start)
-    states = None if nmpc is None else nmpc.n
-    planned = plant is None or isinstance(plant, Plant)
-    if (nmpc is None or nmpc.task is None) and (planned or start is None):
+    states, task = (nmpc.n, nmpc.task) if nmpc else (None, None)
+    if nmpc and task:
+        start = task.start if start is None else start
+        plant = nmpc.plant if plant is None else plant
+    if start is None or plant is None or (isinstance(plant, Plant) and not task):
         raise ValueError(
             "a Problem plans, and says nothing of the environment, its start and its cost; nor does"
             " a controller without an Nmpc:"
             " give plant=(state, action, rng) -> (next state, cost, end), and start="
         )
-    if nmpc is not None and planned:
-        own, task = cast(Plant, plant or nmpc.plant), nmpc.task
-        if (own.n, own.m) != (nmpc.n, nmpc.m):
-            raise ValueError(
-                f"the plant has {own.n} states and {own.m} inputs, and the plan {nmpc.n} and"
-                f" {nmpc.m}"
-            )
-        refuse_narrower("the plant's inputs", own.lower, own.upper, nmpc)
-
-        advance, charge = own.step, task.stage_cost
-
-        def as_task(state: Vector, action: Vector, _: np.random.Generator) -> Step:
-            return advance(state, action), charge(state, action), False, False
-
-        step = as_task
+    if nmpc and task and isinstance(plant, Plant):
+        step = charged(plant, task, nmpc)
     else:
         refuse_other(PLANT, plant, 3)
         step = checked(cast(StepFunction, plant), states)
-    if start is None:
-        start = cast(Nmpc, nmpc).task.start
     return Environment(step, begun(start, states))
 
 
-def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, Any]] | None:
-    """What `Nmpc.solve` is given as its data at each time; None where there are none.
+def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
+    """A plant with the cost of a task, Eq. (20); ValueError where it is too narrow for the plan."""
+    if (plant.n, plant.m) != (nmpc.n, nmpc.m):
+        raise ValueError(f"the plant has {plant.n} states and {plant.m} inputs, and the plan"
+                         f" {nmpc.n} and {nmpc.m}")  # fmt: skip
+    refuse_narrower("the plant's inputs", plant.lower, plant.upper, nmpc)
+    advance, charge = plant.step, task.stage_cost
 
-    Of an array over the times of an episode, a plan at t sees t, ..., t + N; beyond its end the
-    last one stays.
+    def step(state: Vector, action: Vector, _: np.random.Generator) -> Step:
+        return advance(state, action), charge(state, action), False, False
+
+    return step
+
+
+def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, Any]] | None:
+    """The data of `Nmpc.solve` at each time t of an episode; None without data.
+
+    Of an array over the times, a plan at t sees t, ..., t + N, and the last entry beyond its end.
     """
     if data is None:
         return None
     if callable(data):
         refuse_other("data is called as data(t) and returns arrays by name", data, 1)
         return lambda t: {name: numbers(f"data {name}", one) for name, one in data(t).items()}
-    whole = {name: np.array(values, float) for name, values in data.items()}
-    for name, values in whole.items():
+    series = {name: np.array(values, float) for name, values in data.items()}
+    for name, values in series.items():
         if not values.ndim or not len(values):
             raise ValueError(f"data {name!r} must be an array with an axis of time in front")
 
     def window(t: int) -> dict[str, Any]:
         times = np.arange(t, t + horizon + 1)
-        return {name: v[np.minimum(times, len(v) - 1)] for name, v in whole.items()}
+        return {name: v[np.minimum(times, len(v) - 1)] for name, v in series.items()}
 
     return window
 
@@ -139,7 +139,7 @@ def begun(start: Any, states: int | None) -> Callable[[np.random.Generator], Vec
 
 
 def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool = False) -> str:
-    """Why no plan can begin in a state that the plant led to; "" if one can.
+    """Why no plan can begin in a state of the plant; "" if one can.
 
     A state in which an episode ends has to be finite only.
     """
@@ -155,11 +155,7 @@ def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool = False) -> str:
 
 
 def state_of(said: str, given: Any, states: int | None, *, finite: bool = True) -> Vector:
-    """A copy of a state that the user gave, shape (n,); of any size where `states` is None.
-
-    Raises:
-        ValueError: it is none.
-    """
+    """A copy of a user's state, shape (n,), or any where `states` is None; ValueError otherwise."""
     with suppress(TypeError, ValueError):
         state = np.array(given, float).reshape(-1)
         if state.size == (states or state.size) and not (finite and not np.isfinite(state).all()):
@@ -168,14 +164,14 @@ def state_of(said: str, given: Any, states: int | None, *, finite: bool = True) 
 
 
 def refuse_other(usage: str, function: Any, arguments: int) -> None:
-    """Refuse what cannot be called with so many arguments."""
+    """Refuse a function that does not take so many arguments."""
     wrong = mismatch(function, (None,) * arguments)
     if wrong:
         raise ValueError(f"{usage}: {wrong}")
 
 
 def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:
-    """Refuse an environment that cannot apply all that is planned: another action is learned on."""
+    """Refuse an environment with bounds within those of the plan, which cuts actions off."""
     kind = np.asarray(low).dtype  # bounds of 32 bits need not be those of 64
     if (nmpc.lower.astype(kind) < low).any() or (nmpc.upper.astype(kind) > high).any():
         raise ValueError(
@@ -223,11 +219,7 @@ def of_gymnasium(env: GymnasiumEnv, nmpc: Nmpc | None, start: Any = None) -> Env
 
 
 def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:
-    """A plant of the user, whose results are looked at.
-
-    Raises:
-        ValueError: when it is called: a next state of another size, or of what are no numbers.
-    """
+    """A plant of the user, whose results are checked at each call; ValueError for a wrong one."""
 
     def step(state: Vector, action: Vector, rng: np.random.Generator) -> Step:
         result = plant(state.copy(), action.copy(), rng)

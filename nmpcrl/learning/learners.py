@@ -135,12 +135,12 @@ def auxiliary_weights(memory: Any) -> Vector | None:
     return memory and memory.w
 
 
-def projected(rule: UpdateRule, bounds: Bounds) -> Rule:
+def projected(rule: UpdateRule, bounds: tuple[Any, Any]) -> Rule:
     """A rule whose theta is projected into bounds, (least, most), after each step."""
     return Rule(partial(_projected, rule, bounds), rule.init, rule.interrupted)
 
 
-def _projected(rule: UpdateRule, bounds: Bounds, *given: Any) -> tuple[Vector, Any]:
+def _projected(rule: UpdateRule, bounds: tuple[Any, Any], *given: Any) -> tuple[Vector, Any]:
     theta, memory = rule.step(*given)
     return project(theta, *bounds), memory
 
@@ -184,12 +184,12 @@ class Learner:
         moved = self.bounded_rule.step(
             weights.theta, self._memory(weights), transition, delta, successor
         )
-        return Update(_moved(weights, *moved), successor, delta)
+        return Update(weights_after(weights, *moved), successor, delta)
 
     def interrupted(self, weights: Weights) -> Weights:
         """The weights after an episode that a failed solve ended."""
         moved = self.bounded_rule.interrupted(weights.theta, self._memory(weights))
-        return _moved(weights, *moved)
+        return weights_after(weights, *moved)
 
     @cached_property
     def bounded_rule(self) -> UpdateRule:
@@ -200,7 +200,7 @@ class Learner:
         return self.rule.init(weights) if weights.memory is None else weights.memory
 
 
-def _moved(before: Weights, theta: Vector, memory: Any) -> Weights:
+def weights_after(before: Weights, theta: Vector, memory: Any) -> Weights:
     """Weights whose w is that of the memory, or the one before where no rule moves it."""
     w = auxiliary_weights(memory)
     return Weights(theta, before.w if w is None else w, memory)

@@ -25,12 +25,12 @@ from nmpcrl.learning.learners import (
     Rule,
     UpdateRule,
     Weights,
-    auxiliary_weights,
     first_w,
     no_memory,
     semi_gradient,
     tracking,
     two_solves,
+    weights_after,
 )
 from nmpcrl.learning.updates import auxiliary_step
 
@@ -193,7 +193,7 @@ class Undoing:
             return theta, memory
         cost = self.confirm(theta)
         if cost <= memory.cost:
-            best = Weights(theta, auxiliary_weights(memory.inner))
+            best = weights_after(memory.weights, theta, memory.inner)
             return theta, memory._replace(weights=best, cost=cost)
         return memory.weights.theta, memory._replace(inner=self.rule.init(memory.weights))
 
