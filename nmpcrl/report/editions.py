@@ -136,6 +136,17 @@ def parts_anew() -> Count:
     return Count(sum(map(is_anew, every)), len(every))
 
 
+def parts_table() -> str:
+    """Every published part in HTML: its edition, and when its rows were made."""
+    rows = []
+    for part in dict.fromkeys(part for parts in GROUPS.values() for part in parts):
+        date = published.batch_of(published.about(part[0]), part[1]).get("date", "")
+        edition = "<strong>second</strong>" if is_anew(part) else "first"
+        rows.append((escape(part[0]), escape(part[1]), edition, date))
+    header = ("File", "Part", "Edition", "Date")
+    return html_table("The parts of the published data", header, rows)
+
+
 def compared(today: Iterable[Line]) -> pd.DataFrame:
     """The lines of both editions, a row each; a line that only one has stands beside an empty one.
 

@@ -74,19 +74,25 @@ def counts(batch: Batch) -> dict[str, int]:
     return {**batch.get("rows", {}), **batch.get("runs", {})}
 
 
-def epochs(entry: Mapping[str, Any], part: str = "") -> dict[str, int]:
-    """The epochs in which the rows of a part were made; empty where nothing is published.
-
-    They are those of the last batch that counts the part, else of the first batch. Batches without
-    epochs are of the first.
+def batch_of(entry: Mapping[str, Any], part: str = "") -> Batch:
+    """The batch of a part: the last that counts it, else the first; empty if nothing is published.
 
     Args:
         entry: of the manifest, as `about` gives it.
         part: of the table; "" for a table without parts.
     """
     batches = entry.get("batches", [])
-    found = [one for one in batches if part in counts(one)] or batches[:1]
-    return {**dict.fromkeys(EPOCHS, 1), **found[-1].get("epochs", {})} if found else {}
+    found: list[Batch] = [one for one in batches if part in counts(one)] or batches[:1]
+    return found[-1] if found else {}
+
+
+def epochs(entry: Mapping[str, Any], part: str = "") -> dict[str, int]:
+    """The epochs in which the rows of a part were made; empty where nothing is published.
+
+    Batches without epochs are of the first.
+    """
+    batch = batch_of(entry, part)
+    return {**dict.fromkeys(EPOCHS, 1), **batch.get("epochs", {})} if batch else {}
 
 
 def is_current(
