@@ -125,15 +125,6 @@ class Module:
         first = address // SIZE
         return self._numbers[first : first + count].copy()
 
-    def put_singles(self, numbers: Any) -> tuple[int, NDArray[np.float32]]:
-        """Reserve room for an array in single precision; its address, and the room itself."""
-        array = np.asarray(numbers, np.float32)
-        address = self("reserve", array.nbytes)
-        first = address // array.itemsize
-        room = self._numbers.view(np.float32)[first : first + array.size].reshape(array.shape)
-        room[...] = array
-        return address, room
-
     def put_bytes(self, array: NDArray[Any]) -> tuple[int, NDArray[Any]]:
         """Reserve room for an array of any type; its address, and the room itself."""
         address = self("reserve", array.nbytes)

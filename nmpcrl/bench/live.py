@@ -85,7 +85,8 @@ FIT = f"""async ([turns, fits]) => {{
   const data = {DATA}, {{ problem, theta }} = data
   const {{ wasm }} = await solver(module, problem)
   const inputs = problem.target.length + problem.lower.length + theta.length
-  const one = network(wasm, {{ inputs, ...data.network, rate: 0.01 }}, generator(0))
+  const sizes = {{ inputs, ...data.network, capacity: {EXAMPLES}, rate: 0.01 }}
+  const one = network(wasm, sizes, generator(0))
   for (let k = 0; k < {EXAMPLES}; k++) {{
     one.remember(Array.from({{ length: inputs }}, (_, i) => Math.sin(k * (i + 1))), k)
   }}

@@ -8,11 +8,11 @@ from nmpcrl.control.solvers.charge import DISCS, LONGEST
 
 __all__ = ["DISCS", "LONGEST", "module"]  # at most: obstacles, and steps planned
 
-OWN = ("updates", "rules", "network_rules")
+OWN = ("updates", "rules", "dense", "network_entries")
 
 
 def module(of: Plant | Problem, task: Task | None = None) -> bytes:
-    """`control.browser.module` with what `rules` and `network_rules` describe.
+    """`control.browser.module` with what `rules` and `network_entries` describe.
 
     Raises:
         CannotCompile, RuntimeError, CannotLink: as there.

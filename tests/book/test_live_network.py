@@ -1,4 +1,4 @@
-"""The network that a page fits: torch's first weights, numpy's draws, and the runs of Python."""
+"""The network that a page fits: its first weights, and the runs of Python."""
 
 import gzip
 from base64 import b64encode
@@ -6,7 +6,7 @@ from base64 import b64encode
 import numpy as np
 import pytest
 
-from nmpcrl.learning.network import QNetwork
+from nmpcrl.learning.network import DRAW, QNetwork
 from nmpcrl.report.live import frame, noise, two_learners
 from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.problem import problem_of
@@ -14,14 +14,13 @@ from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.setup import controller_of
 
 SCRIPTS = ("solver.js", "random.js", "network.js", "learning.js")
-BATCH, HIDDEN = paper.BATCH, paper.HIDDEN
-SIZES = (BATCH, BATCH + 1, 1000, 7800, 39_000)  # of buffers
+HIDDEN = paper.HIDDEN
 SEEDS = (0, 1, 2, 7, 2**31 - 1)
-DRAWN = """([seeds, sizes, inputs, batch]) => seeds.map(seed => {
+DRAWN = """([seeds, inputs]) => seeds.map(seed => {
   const { generator, firstWeights } = window.nmpcrl
   const drawn = generator(seed), first = drawn.integer63()
   const weights = inputs.map(count => Array.from(firstWeights([count, 64, 64, 1], first)))
-  return { weights, chosen: sizes.map(size => drawn.choice(size, batch)) }
+  return { weights, draw: String(drawn.integer63()) }
 })"""
 TRAINED = """async ({ module, problem, settings, widths }) => {
   const { solver, normal, train } = window.nmpcrl, nmpc = await solver(module, problem)
@@ -66,24 +65,14 @@ def numpys(seed: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed).spawn(3)[1])
 
 
-def test_first_weights_are_those_of_torch_in_every_bit(page):
+def test_a_network_begins_as_in_python_in_every_bit(page):
+    """Its weights, which torch draws, and the state of the generator of its mini-batches."""
     inputs = (5, 14)
-    found = page.evaluate(DRAWN, [SEEDS, [], inputs, BATCH])
-    for seed, drawn in zip(SEEDS, found, strict=True):
+    for seed, drawn in zip(SEEDS, page.evaluate(DRAWN, [SEEDS, inputs]), strict=True):
         for count, weights in zip(inputs, drawn["weights"], strict=True):
-            expected = QNetwork(count, numpys(seed), hidden=HIDDEN)._weights.numpy()
-            assert (np.array(weights, np.float32) == expected).all()
-
-
-def test_mini_batches_are_those_of_numpy(page):
-    """With small batches, too, from so few examples that most are drawn twice."""
-    for sizes, batch in ((SIZES, BATCH), ((1, 2, 3, 9), 1), ((9, 10, 11), 9)):
-        found = page.evaluate(DRAWN, [SEEDS, sizes, [], batch])
-        for seed, drawn in zip(SEEDS, found, strict=True):
-            rng = numpys(seed)
-            rng.integers(2**63)
-            for size, chosen in zip(sizes, drawn["chosen"], strict=True):
-                assert chosen == rng.choice(size, batch, replace=False).tolist()
+            expected = QNetwork(count, numpys(seed), hidden=HIDDEN)
+            assert (np.array(weights, np.float32) == expected.weights).all()
+            assert int(drawn["draw"]) == expected.net[DRAW][0]
 
 
 def test_a_divergence_is_what_the_library_calls_one(page):

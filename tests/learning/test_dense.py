@@ -1,5 +1,6 @@
 """The network's machine code: mini-batches are drawn fairly, and WebAssembly computes the same."""
 
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -9,43 +10,13 @@ from wasm_host import Module
 from nmpcrl.control.codegen.browser import from_texts
 from nmpcrl.learning.network import TEXT, QNetwork, machine_code
 
-ARRAYS = "weights, examples, order, counts, draw, scales, rate, sizes, inputs, capacity"
-ENTRIES = f"""
-from numba import carray, float32, float64, int32, int64, njit, types, uint64
-
-from .dense import at_addresses, fit, predict, remember
-
-singles, numbers, integers, counts, states = map(
-    types.CPointer, (float32, float64, int32, int64, uint64)
-)
-NET = (singles, singles, integers, counts, states, numbers, float64, counts, int32, int32)
-
-
-@njit(int32(*NET, numbers, float64))
-def network_remember({ARRAYS}, row, target):
-    remember(at_addresses({ARRAYS}), carray(row, inputs), target)
-    return 0
-
-
-@njit(float64(*NET))
-def network_fit({ARRAYS}):
-    return fit(at_addresses({ARRAYS}))
-
-
-@njit(int32(*NET, numbers, numbers, int32))
-def network_predict({ARRAYS}, rows, values, count):
-    predict(at_addresses({ARRAYS}), carray(rows, (count, inputs)), carray(values, count))
-    return 0
-
-
-EXPORTS = (network_remember, network_fit, network_predict)
-"""
 EXAMPLES, INPUTS = 300, 14
 
 
 @pytest.fixture(scope="module")
 def module() -> Module:
-    return Module(from_texts({"dense": TEXT, "entries": ENTRIES}))
+    text = files("nmpcrl.learning").joinpath("network_entries.py").read_text("utf-8")
+    return Module(from_texts({"dense": TEXT, "network_entries": text}))
 
 
 def network(activation: str = "relu", **options: Any) -> QNetwork:
@@ -81,9 +52,8 @@ def test_webassembly_continues_a_network_with_the_same_mini_batches(module, acti
     np.testing.assert_array_equal(there[3], [EXAMPLES, 51])
     distance = np.abs(there[0][0] - native.weights).max()
     assert distance < 1e-4 * np.abs(native.weights).max()
-    values = module.put(np.zeros(EXAMPLES))
-    module("network_predict", *net, module.put(rows), values, EXAMPLES)
-    found, expected = module.read(values, EXAMPLES), native.predict(rows)
+    found = [module("network_predict", *net, module.put(row)) for row in rows]
+    expected = native.predict(rows)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-4 * np.abs(expected).max())
 
 

@@ -14,10 +14,11 @@
   };
 
   // A network imitates the NMPC's value: remember, fit, predict.
-  const imitation = (withTheta) => ({ problem, wasm }, { seed, zeta, network: sizes }) => {
+  const imitation = (withTheta) => ({ problem, wasm }, { seed, zeta, episodes, steps, network: sizes }) => {
     const { network, generator } = self.nmpcrl;
     const inputs = problem.target.length + problem.lower.length + (withTheta ? problem.theta : 0);
-    const imitator = network(wasm, { inputs, ...sizes, rate: zeta }, generator(seed));
+    const all = { inputs, ...sizes, capacity: episodes * steps, rate: zeta };
+    const imitator = network(wasm, all, generator(seed));
     const input = (state, action, theta) => [...state, ...action, ...(withTheta ? theta : [])];
     return ({ here: { state, theta }, action, solution, next }) => {
       imitator.remember(input(state, action, theta), solution.value);

@@ -1,5 +1,5 @@
-// The network that imitates the NMPC's value, as nmpcrl/learning/network.py has it: torch's first weights, and
-// fits and predictions by the functions of nmpcrl/learning/network_rules.py.
+// The network that imitates the NMPC's value, as nmpcrl/learning/network.py has it: torch's first weights, and the
+// functions of nmpcrl/learning/network_entries.py for everything else.
 (function imitating() {
   "use strict";
 
@@ -52,46 +52,48 @@
 
   // ---- The network of a run
 
-  // Learns in place. `hidden` neurons in each of two layers, `batch` examples a fit; `generator` draws first weights and mini-batches; the arithmetic is that of `wasm`.
-  function network(wasm, { inputs, hidden, batch, rate }, generator) {
-    const weights = firstWeights([inputs, hidden, hidden, 1], generator.integer63());
-    const mean = new Float32Array(weights.length), square = new Float32Array(weights.length);
-    const examples = []; // rows of input, 1, target
-    let fits = 0;
+  const begins = new WeakMap(); // where the network of a module lies
 
-    // Call with arrays in the module's memory, read back what it wrote, and give the memory back.
-    function called(arrays, call) {
-      const from = wasm.reserve(0);
-      const rooms = arrays.map((array) => {
-        const room = new Float32Array(wasm.memory.buffer, wasm.reserve(array.byteLength), array.length);
-        room.set(array);
-        return room;
-      });
-      const result = call(rooms.map(({ byteOffset }) => byteOffset));
-      arrays.forEach((array, k) => array.set(rooms[k]));
-      wasm.release(from);
-      return result;
+  // Learns in place, in the memory of `wasm`, where it replaces the network before it. `hidden` neurons in each of two
+  // layers, `batch` examples a fit, `capacity` examples in all; `generator` draws the seeds of weights and mini-batches.
+  function network(wasm, { inputs, hidden, batch, capacity, rate }, generator) {
+    if (begins.has(wasm)) wasm.release(begins.get(wasm));
+    begins.set(wasm, wasm.reserve(0));
+    const room = (Kind, count) => (
+      new Kind(wasm.memory.buffer, wasm.reserve(count * Kind.BYTES_PER_ELEMENT), count)
+    );
+    const filled = (Kind, numbers) => {
+      const array = room(Kind, numbers.length);
+      array.set(numbers);
+      return array;
+    };
+    const first = firstWeights([inputs, hidden, hidden, 1], generator.integer63()), count = first.length;
+    const weights = filled(Float32Array, new Float32Array(4 * count)); // gradient and moments, too
+    weights.set(first);
+    const examples = room(Float32Array, capacity * (inputs + 1)), order = room(Int32Array, capacity);
+    const counts = filled(BigInt64Array, [0n, 0n]), draw = filled(BigUint64Array, [generator.integer63()]);
+    const scales = filled(Float64Array, new Float64Array(inputs + 1).fill(1));
+    const sizes = filled(BigInt64Array, [hidden, batch, capacity, 0].map(BigInt)); // 0: ReLU
+    const row = room(Float64Array, inputs);
+    const arrays = [weights, examples, order, counts, draw, scales].map(({ byteOffset }) => byteOffset);
+    const net = [...arrays, rate, sizes.byteOffset, inputs, capacity];
+
+    function remember(input, target) {
+      row.set(input);
+      wasm.network_remember(...net, row.byteOffset, target);
     }
 
-    // One Adam step on a mini-batch; its loss before the step.
-    function fit() {
-      const rows = new Float32Array(batch * (inputs + 2));
-      generator.choice(examples.length, batch).forEach((row, k) => rows.set(examples[row], k * (inputs + 2)));
-      fits += 1;
-      return called([rows, weights, mean, square], (places) => (
-        wasm.network_fit(inputs, hidden, batch, ...places, rate, fits)
-      ));
+    function predict(input) {
+      row.set(input);
+      return wasm.network_predict(...net, row.byteOffset);
     }
 
-    const predict = (input) => called([Float32Array.of(...input, 1), weights], (places) => (
-      wasm.network_predict(inputs, hidden, ...places)
-    ));
-
+    // `fit` makes one Adam step on a mini-batch, and returns its loss before the step.
     return {
-      weights, // now
-      remember: (input, target) => examples.push(Float32Array.of(...input, 1, target)),
-      ready: () => examples.length >= batch,
-      fit,
+      weights: weights.subarray(0, count), // now
+      ready: () => counts[0] >= batch,
+      fit: () => wasm.network_fit(...net),
+      remember,
       predict,
     };
   }

@@ -1,8 +1,7 @@
-// numpy's numbers: default_rng(SeedSequence(seed).spawn(...)[child]) and its normal(), integers() and choice().
+// numpy's numbers: default_rng(SeedSequence(seed).spawn(...)[child]), its normal() and integers(2**63).
 //
 // SeedSequence: O'Neill's seed_seq; PCG64: XSL-RR on 128 bits (O'Neill 2014); the normal law: the ziggurat of
-// Marsaglia and Tsang (2000) with 256 strips, as in numpy/random/src/distributions; whole numbers: Lemire (2019);
-// a choice without replacement: Floyd's, in Bentley (1987).
+// Marsaglia and Tsang (2000) with 256 strips, as in numpy/random/src/distributions.
 (function drawing() {
   "use strict";
 
@@ -96,49 +95,10 @@
     return Float64Array.from({ length: count }, draw);
   }
 
-  // ---- Whole numbers
-
-  // The second child of SeedSequence(seed), which is the network's.
+  // The second child of SeedSequence(seed), which is the network's: integer63() is rng.integers(2**63).
   function generator(seed) {
     const draw = pcg64(seed, 1);
-    let half = -1; // of the 64 bits drawn last, if it is still to be used
-
-    function word32() {
-      if (half >= 0) {
-        const kept = half;
-        half = -1;
-        return kept;
-      }
-      const bits = draw();
-      half = Number(bits >> 32n);
-      return Number(bits & 0xffffffffn);
-    }
-
-    // From 0 to `most`, which is below 2^20: the upper 32 bits of a product, unless it would favour some.
-    function below(most) {
-      if (most === 0) return 0;
-      const count = most + 1, unfair = (2 ** 32 - count) % count;
-      let product = word32() * count;
-      while (product % 2 ** 32 < unfair) product = word32() * count;
-      return Math.floor(product / 2 ** 32);
-    }
-
-    // rng.choice(all, count, replace=False), of which numpy draws many from very many in another way.
-    function choice(all, count) {
-      const taken = new Set(), found = [];
-      for (let last = all - count; last < all; last++) {
-        const drawn = below(last), row = taken.has(drawn) ? last : drawn;
-        taken.add(row);
-        found.push(row);
-      }
-      for (let k = count - 1; k > 0; k--) {
-        const other = below(k);
-        [found[k], found[other]] = [found[other], found[k]];
-      }
-      return found;
-    }
-
-    return { integer63: () => draw() >> 1n, choice }; // the first is rng.integers(2**63)
+    return { integer63: () => draw() >> 1n };
   }
 
   self.nmpcrl = { ...self.nmpcrl, normal, generator, sources: [...(self.nmpcrl?.sources ?? []), drawing] };
