@@ -202,15 +202,6 @@ def test_it_predicts_one_input_or_many_and_learns_nothing_from_it():
     np.testing.assert_array_equal(learner.predict(inputs.reshape(3, 5, 2)), many)
 
 
-def test_what_it_is_told_is_copied():
-    """The caller may reuse its array."""
-    learner, inputs = network(batch=1), np.ones(2)
-    learner.remember(inputs, 1.0)
-    expected = (float(learner.predict(inputs)) - 1.0) ** 2
-    inputs[:] = 50.0
-    assert learner.fit() == pytest.approx(expected, rel=1e-5)
-
-
 def test_scales_are_as_if_the_caller_had_divided():
     inputs, targets = rows(200)
     input_scale, target_scale = SCALED["scales"]
