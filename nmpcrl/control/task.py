@@ -15,6 +15,8 @@ from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, Soft
 from nmpcrl.control.vectors import read_only
 
+NO_DATA = np.zeros(0)
+
 
 class Theta(NamedTuple):
     """The blocks of theta, in the paper's order: (stage, inputs, terminal, constraint)."""
@@ -184,7 +186,7 @@ class Task(Described):
         inputs, known = len(action), self._charges
         if inputs not in known:
             known[inputs] = callable_of(self.charge(inputs))
-        return known[inputs](state, action)
+        return known[inputs](state, action, NO_DATA)
 
     @cached_property
     def _charges(self) -> dict[int, Callable[[Vector, Vector], float]]:
@@ -195,7 +197,8 @@ class Task(Described):
         """Eq. (20) in symbols, as a CasADi function of the state and so many inputs."""
         state, action = ca.SX.sym("state", self.start.size), ca.SX.sym("action", inputs)
         cost = self.cost_of(state, action, self.target, tuple(map(ca.DM, self.discs)))
-        return ca.Function("charge", [state, action], [cost], ["state", "action"], ["cost"])
+        given = [state, action, ca.SX.sym("data", 0)]
+        return ca.Function("charge", given, [cost], ["state", "action", "data"], ["cost"])
 
     def cost_of(self, state: ca.SX, action: ca.SX, target: Any, discs: tuple[Any, ...]) -> ca.SX:
         """Eq. (20) in symbols, for another target and other obstacles than the task's own."""

@@ -182,7 +182,7 @@ def uniform(draw):
     return np.float64((z ^ (z >> np.uint64(31))) >> np.uint64(12)) * 2.0**-52
 
 
-@njit(void(NET, vector, float64), cache=True, **options)
+@njit(**options)
 def remember(net, inputs, target):
     """Store one example, in place of the oldest where as many are remembered as may be.
 
@@ -201,7 +201,7 @@ def remember(net, inputs, target):
     counts[0] += 1
 
 
-@njit(float64(NET), cache=True, **options)
+@njit(**options)
 def fit(net):
     """Make one step of Adam on a mini-batch drawn without replacement, Eq. (10).
 
@@ -231,7 +231,7 @@ def fit(net):
     return loss / batch * scales[inputs] ** 2
 
 
-@njit(void(NET, matrix, float64[::1]), cache=True, **options)
+@njit(**options)
 def predict(net, inputs, values):
     """Compute the value of each row of inputs, Eq. (11)."""
     weights, scales, hidden, tanh = net[0], net[5], net[7][0], net[7][3] != 0
@@ -246,7 +246,7 @@ def predict(net, inputs, values):
         values[r] = found[r] * scales[count]
 
 
-@njit(void(NET, NET, int64, float64), cache=True, **options)
+@njit(**options)
 def follow(target, net, every, rate):
     """Count a step, and at each `every`-th move the weights of `target` a part of the way to `net`.
 
@@ -258,6 +258,14 @@ def follow(target, net, every, rate):
         target[3][1] = net[3][1]
         for k in range(len(near)):
             near[k] = share * far[k] + (ONE - share) * near[k]
+
+
+ENTRIES = (
+    (remember, void(NET, vector, float64)),
+    (fit, float64(NET)),
+    (predict, void(NET, matrix, float64[::1])),
+    (follow, void(NET, NET, int64, float64)),
+)
 
 
 @inlined

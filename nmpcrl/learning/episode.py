@@ -13,25 +13,33 @@ from nmpcrl.control.codegen.jit import CannotCompile, compiled, load
 from nmpcrl.control.solvers import riccati
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.learning.baselines import nothing
-from nmpcrl.learning.bootstrap import Controller, Moves, NextValue, SecondSolve
+from nmpcrl.learning.bootstrap import Controller, Imitation, Moves, NextValue, SecondSolve
 from nmpcrl.learning.learners import Learner, Weights
+from nmpcrl.learning.network import QNetwork, Target, machine_code
 from nmpcrl.learning.training import Exploration, Step, Trainer, absurd, trainer_of
 
 NOTICE = "Compiling Algorithm 1 (once on this machine) ..."
-BEGIN = """from numba import njit
+COMPILED = """from numba import njit
 
-from .loop import EXACT, GRADIENT_TD, SEMI_GRADIENT, SIGNATURE, episode, no_slopes
+from .loop import ABSENT, EXACT, FUNCTIONS, GRADIENT_TD, SEMI_GRADIENT, SIGNATURE, episode
 
-episode = njit(SIGNATURE, cache=True, error_model="numpy")(episode)
+signatures = (FUNCTIONS[1], *FUNCTIONS[4:])
+absent = [njit(one, cache=True)(function) for one, function in zip(signatures, ABSENT)]
+episode = njit(SIGNATURE, cache=True, error_model="numpy", no_cfunc_wrapper=True)(episode)
 """
 TEXTS = {
-    "__init__": BEGIN,
+    "__init__": COMPILED,
     "codes": riccati.TEXTS["codes"],
     **{
         name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
-        for name in ("loop", "updates")
+        for name in ("loop", "updates", "dense")
     },
 }
+NOTHING, SECOND_SOLVE, NETWORK = range(3)  # as in `loop`
+NO_NETWORK = (
+    np.zeros((1, 1), np.float32), np.zeros((0, 1), np.float32), np.zeros(0, np.int32),
+    np.zeros(2, np.int64), np.zeros(1, np.uint64), np.ones(1), 0.0, np.zeros(4, np.int64),
+)  # fmt: skip
 NUMBERS = (  # a column each, as in `loop`; nan or 0 where there is none
     "cost",  # l(s, a)
     "value",  # Q(s, a)
@@ -146,23 +154,29 @@ class Loop:
             functions: the plant and its cost, compiled.
         """
         code, nmpc, learner = load("loop", TEXTS, NOTICE), trainer.nmpc, trainer.learner
-        given, kind, place = machine.arguments, machine.arguments.kind, 0
+        problem, given_action, place = machine.arguments, machine.arguments, 0
         if trainer.constrained:
             fixed = nmpc.machine(fix_action=True)
-            kind, place = fixed.arguments.kind, fixed.place
+            given_action, place = fixed.arguments, fixed.place
         least, most = moves.projection or learner.bounds or (-np.inf, np.inf)
-        d, slopes, rule = trainer.weights.theta.size, code.no_slopes, code.SEMI_GRADIENT
+        d, rule = trainer.weights.theta.size, code.SEMI_GRADIENT
+        slopes, *network = code.absent
         if moves.beta is not None:
             rule = code.EXACT if moves.curvature else code.GRADIENT_TD
         if moves.curvature:
             slopes = machine.slopes
         self._machine, self._nmpc, self._episode = machine, nmpc, code.episode
+        self._valued = learner.bootstrap
+        if isinstance(self._valued, Imitation):
+            network = machine_code().entries
+        next_input = int(nmpc.ocp.inputs[min(1, nmpc.horizon - 1)][0])
         self._given = (
-            machine.code, slopes, *functions, *given[:5], kind, *given[5:],
-            machine.others, machine.drawn, machine.tolerance, place, nmpc.farthest, nmpc.largest,
+            machine.code, slopes, *functions, *network, tuple(problem), tuple(given_action),
+            machine.others, machine.drawn, machine.tolerance,
+            place, next_input, nmpc.farthest, nmpc.largest,
             rule, moves.alpha, moves.beta or 0.0, np.full(d, least), np.full(d, most),
-            learner.bootstrap is not nothing, trainer.constrained, trainer.clipped,
         )  # fmt: skip
+        self._how = trainer.constrained, trainer.clipped
 
     @classmethod
     def of(cls, trainer: Trainer) -> "Loop | None":
@@ -170,8 +184,7 @@ class Loop:
         learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
         valued = learner.bootstrap
         moves = Moves(0.0) if valued is nothing else getattr(learner.rule, "moves", None)
-        known = valued is nothing or (type(valued) is SecondSolve and valued.nmpc is nmpc)
-        if not (known and moves and plant and type(learner) is Learner):
+        if not (_known(valued, nmpc) and moves and plant and type(learner) is Learner):
             return None
         if trainer.controller is not nmpc or type(nmpc) is not Nmpc:
             return None
@@ -201,7 +214,31 @@ class Loop:
         theta, w = last.weights.theta.copy(), last.weights.w.copy()
         point = self._machine.point_of(warm).copy()
         start = Start.SAME if warm.state.tolist() == state.tolist() else Start.SHIFTED
-        done = self._episode(*self._given, int(start), first, state, theta, w, point, noise, rows)
+        done = self._episode(
+            *self._given, *self._bootstrap(len(rows) - first), *self._how, int(start), first,
+            state, theta, w, point, noise, rows,
+        )  # fmt: skip
         n, nmpc = state.size, self._nmpc
         warm = Solution(point[:n], theta, np.nan, w, 0, 0.0, point, nmpc.ocp, nmpc.solver.name)
         return done, state, Weights(theta, w), warm
+
+    def _bootstrap(self, steps: int) -> tuple[Any, ...]:
+        """The kind of the bootstrap, its network and target, with room for so many steps."""
+        valued = self._valued
+        if not isinstance(valued, Imitation):
+            kind = NOTHING if valued is nothing else SECOND_SOLVE
+            return kind, NO_NETWORK, NO_NETWORK, (False, False, False, 0, 0, 0.0)
+        valued.network.reserve(steps)
+        net, target = valued.network.net, valued.target
+        how = valued.with_theta, valued.gated, valued.late, valued.fits
+        if target is None:
+            return NETWORK, net, net, (*how, 0, 0.0)
+        return NETWORK, net, target.net, (*how, target.every, float(target.rate))
+
+
+def _known(valued: Any, nmpc: Nmpc) -> bool:
+    """Whether the loop knows a bootstrap."""
+    if type(valued) is Imitation:
+        known = type(valued.network) is QNetwork and type(valued.target) in (Target, type(None))
+        return known and valued.actions is None
+    return valued is nothing or (type(valued) is SecondSolve and valued.nmpc is nmpc)

@@ -7,10 +7,11 @@ its cost are arguments. For WebAssembly the same text is compiled with the funct
 from types import FunctionType
 
 import numpy as np
-from numba import float64, int64, njit, types
+from numba import float64, int64, njit, types, void
 
 from nmpcrl.control.solvers.codes import End, Start
 
+from .dense import ENTRIES, NET
 from .updates import (
     auxiliary_step,
     curvature_correction,
@@ -29,28 +30,27 @@ NUMBERS = (  # that a row of an episode begins with; state, action, features, th
 )  # fmt: skip
 COUNT = len(NUMBERS)
 
-plain = njit(error_model="numpy")
-vector, matrix, tensor = float64[::1], float64[:, ::1], float64[:, :, ::1]
+SEMI_GRADIENT, GRADIENT_TD, EXACT = range(3)  # rules
+NOTHING, SECOND_SOLVE, NETWORK = range(3)  # values of the next state
+
+plain = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+flag, vector, matrix, tensor = types.boolean, float64[::1], float64[:, ::1], float64[:, :, ::1]
 given = types.Array(float64, 1, "C", readonly=True)
 PROBLEM = (matrix, vector, vector, matrix, int64[:, ::1], vector, vector, float64)  # `Arguments`
 FIND = types.UniTuple(float64, 6)(
     *PROBLEM, vector, vector, vector, int64, tensor, tensor, int64, float64, vector, vector
 )
-SLOPES = types.boolean(
-    *PROBLEM, vector, vector, vector, int64, vector, vector, matrix, matrix, vector
-)
-TRANSITION = types.void(given, given, vector)
-CHARGE = float64(given, given)
-
-
-SEMI_GRADIENT, GRADIENT_TD, EXACT = range(3)  # rules
-flag = types.boolean
+SLOPES = flag(*PROBLEM, vector, vector, vector, int64, vector, vector, matrix, matrix, vector)
+FUNCTIONS = (
+    FIND, SLOPES, void(given, given, vector), float64(given, given, given),
+    *(signature for _, signature in ENTRIES),
+)  # fmt: skip
 SIGNATURE = int64(
-    *map(types.FunctionType, (FIND, SLOPES, TRANSITION, CHARGE)),
-    *PROBLEM[:5], int64[:, ::1], *PROBLEM[5:], tensor, tensor, float64,
-    int64, float64, float64,
-    int64, float64, float64, vector, vector, flag, flag, flag,
-    int64, int64, vector, vector, vector, vector, matrix, matrix,
+    *map(types.FunctionType, FUNCTIONS), types.Tuple(PROBLEM), types.Tuple(PROBLEM),
+    tensor, tensor, float64, int64, int64, float64, float64,
+    int64, float64, float64, vector, vector, int64, NET, NET,
+    types.Tuple((flag, flag, flag, int64, int64, float64)),
+    flag, flag, int64, int64, vector, vector, vector, vector, matrix, matrix,
 )  # fmt: skip
 
 
@@ -103,42 +103,87 @@ def carried(old, place, count, new):
         new[place:] = old[place - count :]
 
 
-@njit(SLOPES, cache=True, error_model="numpy")
+@plain
+def imitated(remember, fit, predict, follow, net, target, imitation, example, value, query):
+    """The value of `query`, the loss, and whether they count, as `Imitation` has them."""
+    _, gated, late, fits, every, rate = imitation
+    found, loss = np.full(1, np.nan), np.nan
+    by = target if every > 0 else net
+    remember(net, example, value)
+    known = by[3][1] > 0 or not gated
+    if known and late:
+        predict(by, query.reshape(1, -1), found)
+    if net[3][0] >= net[7][1]:
+        for _ in range(fits):
+            loss = fit(net)
+        if every > 0:
+            follow(target, net, every, rate)
+    if not late:
+        known = by[3][1] > 0 or not gated
+        if known:
+            predict(by, query.reshape(1, -1), found)
+    return found[0], loss if known else np.nan, known
+
+
 def no_slopes(
     data, lower, upper, sides, kind, discount, weights, tie,
     state, theta, action, fixed, solved, w, of_states, of_inputs, out,
 ):  # fmt: skip
-    """For learners other than `EXACT`, which need no derivatives compiled."""
+    """For learners other than `EXACT`, so that no derivatives are compiled."""
     return False
 
 
+def no_remember(net, inputs, target):
+    """For learners without a network, as are the next three."""
+
+
+def no_fit(net):
+    return np.nan
+
+
+def no_predict(net, inputs, values):
+    pass
+
+
+def no_follow(target, net, every, rate):
+    pass
+
+
+ABSENT = (no_slopes, no_remember, no_fit, no_predict, no_follow)
+
+
 def episode(
-    find, slopes, transition, charge,
-    data, lower, upper, sides, kind, kind_fixed, discount, weights, tie, others, drawn, tolerance,
-    place, farthest, largest,
-    rule, alpha, beta, least, most, second, constrained, clipped,
-    start, first, state, theta, w, warm, noise, rows,
+    find, slopes, transition, charge, remember, fit, predict, follow,
+    problem, given_action, others, drawn, tolerance, place, next_input, farthest, largest,
+    rule, alpha, beta, least, most, bootstrap, net, target, imitation,
+    constrained, clipped, start, first, state, theta, w, warm, noise, rows,
 ):  # fmt: skip
     """The steps first, first + 1, ... of an episode, as `train` makes them.
 
     Args:
-        find: of the plant's solver, for V(s) and Q(s, a).
+        find: of the plant's solver.
         slopes: its derivatives, which `EXACT` calls.
         transition: x, u -> x+ of the environment.
-        charge: x, u -> its cost.
-        data: of a plan; from here to `tie` as in `riccati.Arguments`.
-        kind_fixed: `kind` where u_0 is fixed.
+        charge: x, u, data of stage 0 -> its cost.
+        remember: of `dense`, as are `fit`, `predict` and `follow`.
+        problem: `riccati.Arguments`.
+        given_action: the same where u_0 is given.
         others: cold starts, as in `find`; `drawn` and `tolerance` likewise.
-        place: where the multipliers of a fixed u_0 begin in a solution.
+        place: where the multipliers of a given u_0 begin in a solution.
+        next_input: where u_1 is in a solution.
         farthest: the largest number of a state in which a plan may begin.
         largest: the largest number of theta and w.
         rule: `SEMI_GRADIENT`, `GRADIENT_TD` or `EXACT`.
         alpha: step size of theta.
         beta: step size of w.
         least: bounds of theta, (d,), as is `most`.
-        second: whether a second solve values the next state; else nothing is learned.
+        bootstrap: `NOTHING`, which learns nothing, `SECOND_SOLVE` or `NETWORK`.
+        net: the network, as in `dense`.
+        target: what predicts in its place.
+        imitation: with_theta, gated and late of `Imitation`, its fits a step, and of `Target` every
+            and rate; every is 0 where there is no target.
         constrained: whether Q(s, a) is learned.
-        clipped: whether actions are kept between `lower` and `upper`.
+        clipped: whether actions are kept within the bounds.
         start: the `Start` of the first solve.
         first: the first step.
         state: where it begins, (n,); this and the next three are left as the last step left them.
@@ -152,67 +197,80 @@ def episode(
         The first step that is not made. Behind it is the end of the episode, or weights with which
         no solver can be called, or a step in which a solve failed or the plant ran away.
     """
-    n, m, d, split = len(state), len(lower), len(theta), len(warm)
+    n, m, d, split = len(state), noise.shape[1], len(theta), len(warm)
     plan, successor, solution = np.empty(split + d), np.empty(split + d), np.empty(split)
     now, point = np.empty(split + m + d), np.empty(split + m)
-    none, later, product, moved = np.zeros(m), np.empty(n), np.empty(d), np.empty(d)
-    of_states, of_inputs = np.zeros((len(discount), n)), np.zeros((len(discount) - 1, m))
-    gamma = discount[1]
+    none, later, product = np.zeros(m), np.empty(n), np.empty(d)
+    discount = problem[5]
+    gamma, of_states = discount[1], np.zeros((len(discount), n))
+    of_inputs = np.zeros((len(discount) - 1, m))
+    inputs = n + m + (d if imitation[0] else 0)
     for t in range(first, len(noise)):
         value, iterations, end, violation, _, restarts = find(
-            data, lower, upper, sides, kind, discount, weights, tie,
-            state, theta, none, 0, others, drawn, start, tolerance, warm, plan,
-        )  # fmt: skip
+            *problem, state, theta, none, 0, others, drawn, start, tolerance, warm, plan
+        )
         if end != SOLVED or not value < ABSURD:
             return t
         solves, phi, action = 1, plan[split:], plan[n : n + m] + noise[t]
         if clipped:
-            action = _project(action, lower, upper)  # departure E
+            action = _project(action, problem[1], problem[2])  # departure E
         transition(state, action, later)
-        cost = charge(state, action)
+        cost = charge(state, action, problem[0][0])
         if not usable(later, farthest):
             return t
         solution[:] = plan[:split]
         if constrained:
             carried(solution, place, m, point)
             value, taken, end, beyond, _, failed = find(
-                data, lower, upper, sides, kind_fixed, discount, weights, tie,
-                state, theta, action, 1, others, drawn, SAME, tolerance, point, now,
-            )  # fmt: skip
+                *given_action, state, theta, action, 1, others, drawn, SAME, tolerance, point, now
+            )
             if end != SOLVED or not value < ABSURD:
                 return t
             solves, iterations, restarts = 2, iterations + taken, restarts + failed
             violation, phi = max(violation, beyond), now[split + m :]
             carried(now[: split + m], place, -m, solution)
-        next_value = delta = np.nan
-        if second:
+        next_value = loss = np.nan
+        if bootstrap == SECOND_SOLVE:
+            begin = start_in(later, solution)
             next_value, taken, end, beyond, _, failed = find(
-                data, lower, upper, sides, kind, discount, weights, tie,
-                later, theta, none, 0, others, drawn, start_in(later, solution), tolerance,
-                solution, successor,
+                *problem, later, theta, none, 0, others, drawn, begin, tolerance, solution,
+                successor,
             )  # fmt: skip
             if end != SOLVED or not next_value < ABSURD:
                 return t
             solves, iterations, restarts = solves + 1, iterations + taken, restarts + failed
             violation = max(violation, beyond)
-            delta = _td_error(cost, gamma, value, next_value)
-            if rule == EXACT and not slopes(
-                data, lower, upper, sides, kind_fixed if constrained else kind, discount, weights,
-                tie, state, theta, action if constrained else none, int(constrained),
-                now[: split + m] if constrained else plan[:split], w, of_states, of_inputs, product,
-            ):  # fmt: skip
-                return t
+        formed = True
+        if rule == EXACT and constrained:
+            formed = slopes(
+                *given_action, state, theta, action, 1, now[: split + m], w, of_states, of_inputs,
+                product,
+            )  # fmt: skip
+        elif rule == EXACT:
+            formed = slopes(
+                *problem, state, theta, none, 0, plan[:split], w, of_states, of_inputs, product
+            )
+        if not formed:
+            return t
+        known = bootstrap == SECOND_SOLVE
+        if bootstrap == NETWORK:
+            next_value, loss, known = imitated(
+                remember, fit, predict, follow, net, target, imitation,
+                np.concatenate((state, action, theta))[:inputs], value,
+                np.concatenate((later, solution[next_input : next_input + m], theta))[:inputs],
+            )  # fmt: skip
+        delta = _td_error(cost, gamma, value, next_value)
+        if known:
             if rule == SEMI_GRADIENT:
                 moved = _semi_gradient_step(theta, delta, phi, alpha)
             else:
                 moved = _gradient_td_step(theta, w, delta, phi, successor[split:], alpha, gamma)
-            if rule == EXACT:
-                moved = moved - alpha * _curvature_correction(delta, phi, w, product)
-            if rule != SEMI_GRADIENT:
+                if rule == EXACT:
+                    moved = moved - alpha * _curvature_correction(delta, phi, w, product)
                 w[:] = _auxiliary_step(w, delta, phi, beta)
             theta[:] = _project(moved, least, most)
         numbers = (
-            cost, value, next_value, delta, np.nan, restarts, violation, iterations, float(solves),
+            cost, value, next_value, delta, loss, restarts, violation, iterations, float(solves),
         )  # fmt: skip
         rows[t, :COUNT] = np.array(numbers)
         at = COUNT
@@ -220,7 +278,7 @@ def episode(
             rows[t, at : at + len(part)] = part
             at += len(part)
         state[:] = later
-        warm[:] = successor[:split] if second else solution
+        warm[:] = successor[:split] if bootstrap == SECOND_SOLVE else solution
         start = start_in(state, warm)
         if not usable(theta, largest) or not usable(w, largest):
             return t + 1

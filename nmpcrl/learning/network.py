@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 
 TEXT = files(__package__).joinpath("dense.py").read_text("utf-8")
 NOTICE = "Compiling the network (once on this machine, a few seconds) ..."
+COMPILED = """from numba import njit
+
+from . import dense
+
+entries = remember, fit, predict, follow = [
+    njit(signature, cache=True, **dense.options)(function.py_func)
+    for function, signature in dense.ENTRIES
+]
+"""
 ACTIVATIONS = ("relu", "tanh")
 WEIGHTS, EXAMPLES, ORDER, COUNTS, DRAW, SCALES, RATE, SIZES = range(8)  # in a network's tuple
 UNLIMITED = 2**62  # examples
@@ -67,8 +76,7 @@ def machine_code() -> ModuleType:
     Raises:
         CannotCompile: numba is not installed.
     """
-    init = "from .dense import fit, follow, predict, remember\n"
-    return load("network", {"__init__": init, "dense": TEXT}, NOTICE)
+    return load("network", {"__init__": COMPILED, "dense": TEXT}, NOTICE)
 
 
 class Predictor:
@@ -222,8 +230,8 @@ class Target(Predictor):
         weights, examples, order, counts, *rest = network.net
         empty = (examples[:0].copy(), order[:0].copy(), np.zeros_like(counts))
         self.net = (weights[:1].copy(), *empty, *rest)
-        self._network, self._every, self._rate = network, every, rate
+        self._network, self.every, self.rate = network, every, rate
 
     def follow(self) -> None:
         """Count a step in which the network was fitted, and move where it is time."""
-        machine_code().follow(self.net, self._network.net, self._every, self._rate)
+        machine_code().follow(self.net, self._network.net, self.every, self.rate)

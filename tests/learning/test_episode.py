@@ -27,7 +27,8 @@ from nmpcrl.learning.loop import FIND, SLOPES
 from nmpcrl.learning.loop import NUMBERS as OF_LOOP
 from nmpcrl.learning.remedies import guarded
 from nmpcrl.learning.training import trainer_of
-from nmpcrl.study import paper
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.learners import LEARNERS, NETWORKS, Generators
 
 THETA = np.array(paper.THETA_INIT)
 EPISODES, STEPS = 3, 60
@@ -41,6 +42,24 @@ MAKE = {
     "QL": lambda nmpc: q_learning(nmpc, paper.ALPHA),
     "frozen": frozen,
 }
+
+
+def imitating(kind, **fields):
+    """A learner with a new network, always the same."""
+
+    def make(nmpc):
+        generators = Generators(*map(np.random.default_rng, range(3)))
+        return LEARNERS[kind].make(Experiment(kind, alpha=1e-6, **fields), nmpc, generators)
+
+    return make
+
+
+MAKE |= {
+    "DES": imitating("DES"),
+    "RDES": imitating("RDES"),
+    "RDES literal": imitating("RDES", gated=False),
+}
+READINGS = [name for name in NETWORKS if name not in ("plain", "greedy")]
 OPTIONS = [{}, {"constrained": True}, {"constrained": False, "clipped": False}]
 SOLVED, LIMIT, COLD = int(End.SOLVED), float(End.LIMIT), int(Start.COLD)
 
@@ -126,6 +145,12 @@ def test_every_learner_makes_the_steps_of_the_generator(nmpc, name, options):
     assert len(columns["cost"]) == EPISODES * STEPS
 
 
+@pytest.mark.parametrize("reading", READINGS)
+def test_every_reading_of_the_network_makes_the_steps_of_the_generator(nmpc, reading):
+    columns = assert_same(imitating("RDES", network=reading, steps=20), nmpc)
+    assert np.isfinite(columns["loss"]).any()
+
+
 def test_noise_may_decay_by_episodes_and_a_start_may_be_drawn(nmpc):
     def start(rng):
         return np.array(paper.START) + rng.uniform(0, 0.3, 3)
@@ -163,7 +188,7 @@ def failing(nmpc):
     return controller
 
 
-@pytest.mark.parametrize("name", ["ES", "TDC", "QL", "frozen"])
+@pytest.mark.parametrize("name", ["ES", "TDC", "QL", "RDES", "frozen"])
 def test_a_solve_that_fails_warm_is_begun_anew_by_both(failing, name):
     columns = assert_same(MAKE[name], failing(cold=False))
     assert 0 < (columns["restarts"] > 0).sum() < 30
@@ -224,8 +249,9 @@ def test_weights_that_leave_all_numbers_are_a_divergence_in_both(nmpc, make, wha
         lambda nmpc: {"plant": lambda s, a, _: (nmpc.plant.step(s, a), 1.0, False)},
         lambda nmpc: {"nmpc": paper.nmpc(solver="fatrop")},
         lambda nmpc: {"make": lambda n: guarded(gradient_expected_sarsa(n, 1e-6, 1e-7), 1e-6)},
+        lambda nmpc: {"make": imitating("RDES", network="greedy", gated=False)},
     ],
-    ids=["gamma", "plant", "solver", "rule"],
+    ids=["gamma", "plant", "solver", "rule", "greedy"],
 )
 def test_what_the_loop_does_not_know_takes_the_generator(nmpc, change):
     changed = {"make": frozen, "nmpc": nmpc, "explore": noise(steps=3)} | change(nmpc)
