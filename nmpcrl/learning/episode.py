@@ -78,9 +78,8 @@ def episodes(
 ) -> Iterator[Episode]:
     """The steps of `train` to the last bit, by episodes; the arguments are the same.
 
-    For a learner that is built in, with riccati and a `Plant`, they are made by one compiled
-    function, twice as fast. What it cannot do is done by `train`, a step at a time: an episode's
-    first solve, a solve that fails, and a plant that runs away.
+    For a learner that is built in, with riccati and a `Plant`, one compiled function makes them.
+    A step of which it cannot make a part, as where fatrop takes over, is made by `train`.
 
     Raises:
         ValueError, Diverged: as `train`.
@@ -99,13 +98,17 @@ def _episodes(trainer: Trainer) -> Iterator[Episode]:
 
 
 def _episode(trainer: Trainer, loop: "Loop | None", number: int, weights: Weights) -> Episode:
-    """An episode; after each step of `train` the loop goes on, where there is one."""
+    """An episode; a step that the loop does not make is one of `train`, and then it goes on."""
     nmpc, d, failure, solver = trainer.nmpc, weights.theta.size, "", ""
     sizes = {"state": nmpc.n, "action": nmpc.m, "features": d, "theta": d, "w": d}
     noise = np.ascontiguousarray(trainer.explore.scaled[number])
     rows, t = np.empty((len(noise), len(NUMBERS) + sum(sizes.values()))), 0
     state, warm = trainer.environment.start(trainer.rng), None
-    while t < len(rows) and not absurd(weights, nmpc.largest):
+    while True:
+        if loop:
+            t, state, weights, warm = loop.run(t, state, weights, warm, noise, rows)
+        if t == len(rows) or absurd(weights, nmpc.largest):
+            break
         for step in trainer.steps(number, t, state, weights, warm):
             rows[t], t = _row(step), t + 1
             weights, failure = step.weights, step.failure
@@ -115,7 +118,7 @@ def _episode(trainer: Trainer, loop: "Loop | None", number: int, weights: Weight
                 break
         if step.last or not loop:
             break
-        t, state, weights, warm = loop.run(t, step, noise, rows)
+        state, warm = step.next_state, step.warm
     numbers, *parts = np.split(rows[:t], np.cumsum([len(NUMBERS), *sizes.values()])[:-1], axis=1)
     columns = dict(zip(NUMBERS, numbers.T, strict=True)) | dict(zip(sizes, parts, strict=True))
     return Episode(number, columns, weights, failure, solver)
@@ -177,6 +180,7 @@ class Loop:
             rule, moves.alpha, moves.beta or 0.0, np.full(d, least), np.full(d, most),
         )  # fmt: skip
         self._how = trainer.constrained, trainer.clipped
+        self._size = 2 * nmpc.ocp.lower.size + nmpc.ocp.equality.size  # z, lam and nu
 
     @classmethod
     def of(cls, trainer: Trainer) -> "Loop | None":
@@ -204,23 +208,32 @@ class Loop:
             return None
 
     def run(
-        self, first: int, last: Step, noise: Matrix, rows: Matrix
-    ) -> tuple[int, Vector, Weights, Solution]:
-        """Make the steps that follow another one, and write their rows.
+        self,
+        first: int,
+        state: Vector,
+        weights: Weights,
+        warm: Solution | None,
+        noise: Matrix,
+        rows: Matrix,
+    ) -> tuple[int, Vector, Weights, Solution | None]:
+        """Make steps from the first on, and write their rows.
 
         Returns the first step that is not made, and its state, weights and warm start.
         """
-        warm, state = last.warm, np.array(last.next_state)
-        theta, w = last.weights.theta.copy(), last.weights.w.copy()
-        point = self._machine.point_of(warm).copy()
-        start = Start.SAME if warm.state.tolist() == state.tolist() else Start.SHIFTED
+        start, point = Start.COLD, np.zeros(self._size)
+        if warm is not None:
+            start = Start.SAME if warm.state.tolist() == state.tolist() else Start.SHIFTED
+            point[:] = self._machine.point_of(warm)
+        state, theta, w = state.copy(), weights.theta.copy(), weights.w.copy()
         done = self._episode(
             *self._given, *self._bootstrap(len(rows) - first), *self._how, int(start), first,
             state, theta, w, point, noise, rows,
         )  # fmt: skip
-        n, nmpc = state.size, self._nmpc
-        warm = Solution(point[:n], theta, np.nan, w, 0, 0.0, point, nmpc.ocp, nmpc.solver.name)
-        return done, state, Weights(theta, w), warm
+        if done > first:
+            nmpc, weights = self._nmpc, Weights(theta, w)
+            x, none = point[: state.size], np.empty(0)
+            warm = Solution(x, theta, np.nan, none, 0, 0.0, point, nmpc.ocp, nmpc.solver.name)
+        return done, state, weights, warm
 
     def _bootstrap(self, steps: int) -> tuple[Any, ...]:
         """The kind of the bootstrap, its network and target, with room for so many steps."""

@@ -22,7 +22,7 @@ from .updates import (
     td_error,
 )
 
-COLD, SHIFTED, _, SAME = map(int, Start)
+SHIFTED, SAME = int(Start.SHIFTED), int(Start.SAME)
 SOLVED = int(End.SOLVED)
 ABSURD = 1e24  # no value is larger
 NUMBERS = (  # that a row of an episode begins with; state, action, features, theta and w follow
@@ -168,7 +168,7 @@ def episode(
         remember: of `dense`, as are `fit`, `predict` and `follow`.
         problem: `riccati.Arguments`.
         given_action: the same where u_0 is given.
-        others: cold starts, as in `find`; `drawn` and `tolerance` likewise.
+        others: cold starts, as in `find`, as are `drawn` and `tolerance`.
         place: where the multipliers of a given u_0 begin in a solution.
         next_input: where u_1 is in a solution.
         farthest: the largest number of a state in which a plan may begin.

@@ -168,20 +168,19 @@ def failing(nmpc):
     """A controller whose solves fail between two values of x, from a warm start or from all."""
     code = riccati.machine_code(nmpc.problem)
 
-    def controller(*, cold):
+    def controller(*, all_fail):
         @njit(FIND)
         def find(
             data, lower, upper, sides, kind, discount, weights, tie, state, theta, action, fixed,
             others, drawn, start, tolerance, warm_start, out,
         ):  # fmt: skip
-            found = code(
+            between = 0.0 < state[0] < 0.3
+            value, iterations, ended, violation, error, failed = code(
                 data, lower, upper, sides, kind, discount, weights, tie, state, theta, action,
-                fixed, others, drawn, start, tolerance, warm_start, out,
+                fixed, others, drawn, COLD if between else start, tolerance, warm_start, out,
             )  # fmt: skip
-            value, iterations, ended, violation, error, failed = found
-            if 0.0 < state[0] < 0.3 and (cold or start != COLD):
-                ended, failed = LIMIT, failed + 1.0
-            return value, iterations, ended, violation, error, failed
+            ended = LIMIT if between and all_fail else ended
+            return value, iterations, ended, violation, error, failed + between
 
         return paper.nmpc(solver=Riccati(code=lambda _: find))
 
@@ -190,12 +189,12 @@ def failing(nmpc):
 
 @pytest.mark.parametrize("name", ["ES", "TDC", "QL", "RDES", "frozen"])
 def test_a_solve_that_fails_warm_is_begun_anew_by_both(failing, name):
-    columns = assert_same(MAKE[name], failing(cold=False))
+    columns = assert_same(MAKE[name], failing(all_fail=False))
     assert 0 < (columns["restarts"] > 0).sum() < 30
 
 
 def test_where_every_start_fails_fatrop_takes_over_in_both(failing):
-    nmpc = failing(cold=True)
+    nmpc = failing(all_fail=True)
     assert_same(MAKE["ES"], nmpc)
     made = list(episodes(MAKE["ES"](nmpc), nmpc, weights(), noise()))
     assert {episode.solver for episode in made} == {"fatrop"}
@@ -203,7 +202,7 @@ def test_where_every_start_fails_fatrop_takes_over_in_both(failing):
 
 def test_where_no_solver_finds_an_optimum_the_episode_ends_in_both(failing, monkeypatch):
     monkeypatch.setattr("nmpcrl.control.solvers.nlpsol.Program.solve", raising)
-    columns = assert_same(MAKE["ES"], failing(cold=True))
+    columns = assert_same(MAKE["ES"], failing(all_fail=True))
     assert np.isnan(columns["delta"]).sum() == EPISODES
 
 
