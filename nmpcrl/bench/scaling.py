@@ -9,7 +9,7 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.bench.solves import THETA, Columns, transposed
-from nmpcrl.control import Nmpc, Obstacle, Solution, SolverError
+from nmpcrl.control import Fatrop, Nmpc, Obstacle, Riccati, Solution, SolverError
 from nmpcrl.study import paper
 
 HORIZONS = (5, 10, 20, 40, 80)
@@ -76,9 +76,9 @@ def time_horizons(
         us_per_iteration (nan where the solver began more than once), value; nan where it failed.
     """
     controllers = {
-        (horizon, solver): paper.nmpc(layout, horizon=horizon, solver=solver)
+        (horizon, solver.name): paper.nmpc(layout, horizon=horizon, solver=solver)
         for horizon in horizons
-        for solver in ("riccati", "fatrop")
+        for solver in (Riccati(starts=1), Fatrop())
     }
     for controller in controllers.values():
         controller.solve(paper.task(layout).start, theta)  # transcribes

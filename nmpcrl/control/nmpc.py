@@ -178,7 +178,6 @@ class Nmpc(Described):
         In microseconds an input by riccati. At a bound or row that is just reached, where the
         policy has a kink, it lies between the derivatives of the two sides; where more is reached
         than the inputs can follow, it is that of the side to which theta grows: see `Sensitivity`.
-        There riccati's derivatives of a task, unlike those of a `Problem`, belong to neither side.
 
         Raises:
             DerivativeError: a `SolverError`: the optimum moves in a direction without curvature.

@@ -99,7 +99,7 @@ def test_without_a_derivative_the_error_is_that_of_a_solve(solver):
     np.testing.assert_allclose(nmpc.policy_jacobian(one), 0, atol=1e-6)  # nothing pulls at it
 
 
-@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_between_two_discs_the_hessian_is_the_slope_of_the_gradient_where_theta_grows(solver):
     """Of the robot at the end of a gap, where rows of many stages depend on one another."""
     nmpc, rng, side = paper.nmpc(JUDGE["J002"], solver=solver), np.random.default_rng(0), 1e-5
@@ -114,6 +114,8 @@ def test_between_two_discs_the_hessian_is_the_slope_of_the_gradient_where_theta_
         expected = nmpc.value_hessian(one) @ grown
         near, far = (nmpc.solve(state, theta + k * side * grown, one).features for k in (1, 2))
         scale = np.abs(expected).max()
+        product = nmpc.value_hessian_times(one, grown)
+        np.testing.assert_allclose(product, expected, rtol=0, atol=1e-3 * scale)
         np.testing.assert_allclose((far - near) / side, expected, rtol=0, atol=0.03 * scale)
         asked += 1
     assert asked > 20
