@@ -96,6 +96,7 @@ def trace(
     with np.errstate(all="ignore"):
         _point(ocp, plain).solve(state, theta, warm_start, began=0.0, data=known)
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
+    iterates.loc[iterates.index[-1], "delta"] = np.nan  # not that of the look at its curvature
     iterates["value"] = factor[-1] * iterates["value"] + _settled(ocp, state, theta, known)
     return iterates
 
