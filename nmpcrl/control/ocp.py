@@ -68,7 +68,7 @@ class Ocp:
 
     @cached_property
     def sizes(self) -> tuple[Vector, Vector]:
-        """The units of z and of g: slacks and rows in their `Problem.typical_row_sizes`."""
+        """The units of z and g; those of slacks and rows are `Problem.typical_row_sizes`."""
         z, g = np.ones(self.lower.size), np.ones(self.equality.size)
         soft, sizes = self.problem.soft, self.problem.typical_row_sizes
         z[self.slacks] = g[self.obstacles] = sizes[soft]

@@ -84,15 +84,18 @@ def tie() -> Example:
     one, other = map(first_rollout, beside)
     sentence = (
         "The obstacle stands in the middle of the way. Move the robot {aside:.2f} m to either side,"
-        " and it passes on that side, at a cost of {one:.0f}. Exactly between, the solver finds"
-        " neither of the two equal plans: the robot stops before the obstacle, at a cost of"
-        " {between:.0f}."
+        " and it passes on that side, at a cost of {one:.0f}. Exactly between, the two plans are"
+        " equal, and between them is one that stops before the obstacle: no small step improves it,"
+        " but a step aside lowers the cost to second order. The solver looks at the curvature,"
+        " begins again, and passes at a cost of {between:.0f}."
     )
+    start, theta = np.array(experiment.start), np.array(experiment.theta)
     numbers = {
         "aside": ASIDE,
         "one": one.cost,
         "other": other.cost,
         "between": first_rollout(experiment).cost,
+        "restarts": controller_of(experiment).solve(start, theta).restarts,
         "apart": float(np.abs(one.states[:, 1] - other.states[:, 1]).max()),
     }
     return example(
@@ -100,10 +103,7 @@ def tie() -> Example:
         sentence,
         numbers,
         experiment,
-        look=(
-            "Look at the two robots: one stands before the obstacle, and the other, which starts"
-            " a little aside, passes it."
-        ),
+        look="Look at the two robots: both pass, and one that starts a little aside is cheaper.",
         against=replace(experiment, start=(x, y + ASIDE, heading)),
         learned=False,
     )

@@ -78,7 +78,8 @@ def test_the_two_plans_are_mirrored_and_cost_the_same(shown):
     numbers = shown["A tie"].numbers
     np.testing.assert_allclose(numbers["one"], numbers["other"], rtol=1e-9)
     assert numbers["apart"] > 2.4  # the obstacle with its circle is 2.5 m wide
-    assert numbers["between"] > 2 * numbers["one"]
+    assert numbers["one"] < numbers["between"] < 1.1 * numbers["one"]
+    assert numbers["restarts"] > 0
 
 
 @pytest.mark.parametrize("title", TITLES[3:5])
