@@ -77,7 +77,7 @@ class Ocp:
 
     @property
     def cost_size(self) -> float:
-        """The unit of the objective: `Problem.cost_scale` where that is small."""
+        """The unit of the objective, `Problem.cost_scale` where that is small, else 1."""
         size = self.problem.cost_scale
         return size if size < SMALL else 1.0
 
