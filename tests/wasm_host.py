@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from wasmtime import _bindings as c
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Riccati
+from nmpcrl.control import Nmpc, browser
 
 # wasmtime hands a function one array of 16 bytes a value, for its arguments and its result.
 CALLED = types.intp(types.voidptr, types.voidptr, types.CPointer(types.float64), types.uint64)
 SIZE = 8  # bytes of a number
+HEAD = 6  # numbers of a problem before its data, as `solvers.entries` has it
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 NO_FINALIZER = ctypes.cast(None, ctypes.CFUNCTYPE(None, ctypes.c_void_p))
 
@@ -144,190 +145,109 @@ class Module:
 
 
 class Controller:
-    """An `Nmpc` whose solves a module makes; solutions are (value, features, action, numbers)."""
+    """An `Nmpc` whose solves a module makes, in the units in which it is solved.
+
+    Solutions are dictionaries: value, features, action and all numbers, among others.
+    """
 
     def __init__(self, module: Module, nmpc: Nmpc) -> None:
+        problem = browser.problem(nmpc.problem, nmpc.solver, ties_active=nmpc.ties_active)
         self.module, self.nmpc = module, nmpc
-        target, lower, upper, discs, sides, discount, *rest = Riccati().prepare(nmpc.ocp).problem
-        self.horizon, self.discs = len(discount) - 1, len(discs)
-        arrays = [module.put(each) for each in (target, lower, upper, discs, sides, discount)]
-        self._target, self._discs = arrays[0], arrays[3]
-        self._problem = (self.horizon, self.discs, len(sides), *arrays, *rest)
-        n, m = nmpc.plant.n, nmpc.plant.m
-        self._d = 2 * n + m + 1
-        z = (self.horizon + 1) * (n + self.discs) + self.horizon * m
-        lam = (self.horizon + 1) * (n + self.discs)
-        self._sizes = [2 * z + lam + fixed * m + self._d for fixed in (0, 1)]
-        rooms = (n, self._d, m, self._sizes[1], self._sizes[1], 5, n, self._d)
-        self._at = [module.put(np.zeros(size)) for size in rooms]
+        self.n, self.m, self.d = (problem[name] for name in ("states", "inputs", "theta"))
+        self._units, self._input_units = map(np.array, (problem["units"], problem["input_units"]))
+        self.horizon, rows = len(problem["discount"]) - 1, len(problem["weights"])
+        slacks = rows - problem["fixed"] + problem["soft"]
+        z = (self.horizon + 1) * (self.n + slacks) + self.horizon * self.m
+        lam = (self.horizon + 1) * (self.n + rows)
+        self._sizes = [2 * z + lam + fixed * self.m for fixed in (0, 1)]
+        self._width = len(problem["data"][0])
+        self._default = np.ravel(problem["data"])
+        self._data = module.put(browser.packed(problem)) + HEAD * SIZE
+        rooms = {
+            "state": self.n,
+            "theta": self.d,
+            "action": self.m,
+            "warm": self._sizes[1],
+            "out": self._sizes[1] + self.d,
+            "report": 5,
+            "next": self.n,
+            "vector": self.d,
+            "states": (self.horizon + 1) * self.n,
+            "inputs": self.horizon * self.m,
+            "slope": self.d,
+        }
+        self._at = {name: module.put(np.zeros(size)) for name, size in rooms.items()}
 
-    def solve(self, state, theta, warm_start=None, action=None):
-        """As `Nmpc.solve`.
+    def _write(self, data=None, state=None, action=None, **numbers) -> None:
+        if state is not None:
+            numbers["state"] = state / self._units
+        if action is not None:
+            numbers["action"] = action / self._input_units
+        for name, array in numbers.items():
+            self.module.write(self._at[name], np.ravel(array))
+        self.module.write(self._data, self._default if data is None else np.ravel(data))
+
+    def _places(self, *names: str) -> list[int]:
+        return [self._data - HEAD * SIZE, *(self._at[name] for name in names)]
+
+    def solve(self, state, theta, warm_start=None, action=None, data=None):
+        """As `Nmpc.solve`; data are those of all stages.
 
         Raises:
             ArithmeticError: no optimum was found; with the end.
         """
-        n, m = self.nmpc.plant.n, self.nmpc.plant.m
-        states, thetas, actions, old, out, report, *_ = self._at
-        there = states, thetas, actions
-        fixed = int(action is not None)
-        for place, numbers in zip(there, (state, theta, action), strict=True):
-            if numbers is not None:
-                self.module.write(place, numbers)
-        known = -1
+        fixed, known = int(action is not None), -1
+        self._write(data, state, action, theta=theta)
         if warm_start is not None:
-            known = int(warm_start["fixed"])
-            self.module.write(old, warm_start["numbers"])
-        arguments = (*self._problem, *there, fixed, known, old, 1e-8, out, report)
-        end = self.module("nmpc_solve", *arguments)
+            known = warm_start["fixed"]
+            self._write(data, warm=warm_start["numbers"])
+        _, *last = self._places("warm", "out", "report")
+        given = self._places("state", "theta", "action")
+        end = self.module("nmpc_solve", *given, fixed, known, last[0], 1e-8, *last[1:])
         if end:
             raise ArithmeticError(end)
-        value, iterations, restarts, violation, _ = self.module.read(report, 5)
-        numbers = self.module.read(out, self._sizes[fixed])
+        value, iterations, restarts, violation, _ = self.module.read(self._at["report"], 5)
+        numbers = self.module.read(self._at["out"], self._sizes[fixed] + self.d)
         return {
             "value": value,
             "iterations": int(iterations),
             "restarts": int(restarts),
             "violation": violation,
             "fixed": fixed,
-            "numbers": numbers,
-            "action": numbers[n : n + m],
-            "features": numbers[-self._d :],
-        }
-
-    def hessian_times(self, state, theta, solution, vector, action=None):
-        """As `Nmpc.value_hessian_times`."""
-        states, thetas, actions, old, _, _, _, out = self._at
-        self.module.write(states, state)
-        self.module.write(thetas, theta)
-        self.module.write(actions, np.zeros(self.nmpc.plant.m) if action is None else action)
-        self.module.write(old, solution["numbers"])
-        w = self.module.put(vector)
-        there = (states, thetas, actions, solution["fixed"], old, w, out)
-        formed = self.module("nmpc_hessian_times", *self._problem, *there)
-        self.module("release", w)
-        return self.module.read(out, self._d) if formed else None
-
-    def step(self, state, action):
-        """As `Plant.step`."""
-        states, _, actions, *_, later, _ = self._at
-        self.module.write(states, state)
-        self.module.write(actions, action)
-        self.module("plant_step", states, actions, later)
-        return self.module.read(later, self.nmpc.plant.n)
-
-    def cost(self, state, action, discs=None):
-        """As `Task.stage_cost`; obstacles may be elsewhere from now on."""
-        states, _, actions, *_ = self._at
-        self.module.write(states, state)
-        self.module.write(actions, action)
-        if discs is not None:
-            self.module.write(self._discs, np.ravel(discs))
-        return self.module("stage_cost", self.discs, self._discs, self._target, states, actions)
-
-
-class ProblemController:
-    """An `Nmpc` of a `Problem` whose solves a module makes; solutions are those of `Controller`."""
-
-    def __init__(self, module: Module) -> None:
-        self.module = module
-        sizes = module.put(np.zeros(8))
-        module("nmpc_sizes", sizes)
-        self.n, self.m, self.d, self.N, _, size, z, lam = map(int, module.read(sizes, 8))
-        self._sizes = [2 * z + lam + fixed * self.m for fixed in (0, 1)]
-        most = self._sizes[1] + self.d
-        rooms = {
-            "data": (self.N + 1) * size,
-            "state": self.n,
-            "theta": self.d,
-            "action": self.m,
-            "warm": most,
-            "out": most,
-            "report": max(5, self.n),
-            "vector": self.d,
-            "states": (self.N + 1) * self.n,
-            "inputs": self.N * self.m,
-            "slope": self.d,
-            "least": self.d,
-            "most": self.d,
-        }
-        self.at = {name: module.put(np.zeros(size)) for name, size in rooms.items()}
-        names = ("data", "theta", "least", "most", "action", "state")
-        module("nmpc_defaults", *(self.at[name] for name in names))
-        self.theta = module.read(self.at["theta"], self.d)
-        self.data = module.read(self.at["data"], rooms["data"])
-
-    def _write(self, **numbers) -> None:
-        for name, array in numbers.items():
-            if array is not None:
-                self.module.write(self.at[name], np.ravel(array))
-
-    def _places(self, *names: str) -> list[int]:
-        return [self.at[name] for name in names]
-
-    def begin(self, state, theta, data=None):
-        """As `Nmpc.solve` where there is neither a warm start nor an action."""
-        self._write(state=state, theta=theta, data=self.data if data is None else data)
-        given = self._places("data", "state", "theta")
-        end = self.module("nmpc_begin", *given, 1e-8, *self._places("out", "report"))
-        return self._found(end, 0)
-
-    def solve(self, state, theta, warm_start=None, action=None, data=None):
-        """As `Nmpc.solve` with one cold start; data are those of all stages.
-
-        Raises:
-            ArithmeticError: no optimum was found; with the end.
-        """
-        fixed, known = int(action is not None), -1
-        self._write(state=state, theta=theta, action=action)
-        self._write(data=self.data if data is None else data)
-        if warm_start is not None:
-            known = warm_start["fixed"]
-            self._write(warm=warm_start["numbers"])
-        given = self._places("data", "state", "theta", "action")
-        end = self.module(
-            "nmpc_solve",
-            *given,
-            fixed,
-            known,
-            self.at["warm"],
-            1e-8,
-            *self._places("out", "report"),
-        )
-        return self._found(end, fixed)
-
-    def _found(self, end, fixed):
-        if end:
-            raise ArithmeticError(end)
-        value, iterations, restarts, *_ = self.module.read(self.at["report"], 5)
-        numbers = self.module.read(self.at["out"], self._sizes[fixed] + self.d)
-        return {
-            "value": value,
-            "iterations": int(iterations),
-            "restarts": int(restarts),
-            "fixed": fixed,
-            "numbers": numbers,
-            "action": numbers[self.n : self.n + self.m],
+            "numbers": numbers[: -self.d],
+            "action": numbers[self.n : self.n + self.m] * self._input_units,
             "features": numbers[-self.d :],
         }
 
-    def slopes(self, state, theta, solution, vector, states, inputs, action=None):
-        """`Nmpc.value_hessian_times` and the gradient of a weighted plan, or None."""
-        self._write(state=state, theta=theta, action=action, warm=solution["numbers"])
-        self._write(vector=vector, states=states, inputs=inputs)
-        given = self._places("data", "state", "theta", "action")
-        there = self._places("warm", "vector", "states", "inputs", "slope")
-        formed = self.module("nmpc_slopes", *given, solution["fixed"], *there)
-        return self.module.read(self.at["slope"], self.d) if formed else None
+    def slopes(self, state, theta, solution, vector=None, states=None, inputs=None, action=None):
+        """`Nmpc.value_hessian_times` plus the gradient of a weighted plan, or None."""
+        weights = {"vector": np.zeros(self.d) if vector is None else vector}
+        weights["states"] = np.zeros((self.horizon + 1, self.n)) if states is None else states
+        weights["inputs"] = np.zeros((self.horizon, self.m)) if inputs is None else inputs
+        weights["states"] = weights["states"] * self._units
+        weights["inputs"] = weights["inputs"] * self._input_units
+        self._write(None, state, action, theta=theta, warm=solution["numbers"], **weights)
+        _, *last = self._places("warm", "vector", "states", "inputs", "slope")
+        given = self._places("state", "theta", "action")
+        formed = self.module("nmpc_slopes", *given, solution["fixed"], *last)
+        return self.module.read(self._at["slope"], self.d) if formed else None
 
-    def step(self, state, action, theta):
+    def step(self, state, action, theta=None):
         """x+ of the model, with the data of stage 0."""
-        self._write(state=state, theta=theta, action=action)
-        given = self._places("data", "state", "action", "theta")
-        self.module("model_step", *given, self.at["report"])
-        return self.module.read(self.at["report"], self.n)
+        theta = np.zeros(self.d) if theta is None else theta
+        self._write(None, state, action, theta=theta)
+        self.module("model_step", *self._places("state", "theta", "action", "next"))
+        return self.module.read(self._at["next"], self.n) * self._units
 
-    def cost(self, state, action, theta):
-        """l, with the data of stage 0."""
-        self._write(state=state, theta=theta, action=action)
-        return self.module("stage_cost", *self._places("data", "state", "action", "theta"))
+    def stage_cost(self, state, action, theta):
+        """l of the problem, with the data of stage 0."""
+        self._write(None, state, action, theta=theta)
+        return self.module("stage_cost", *self._places("state", "theta", "action"))
+
+    def cost(self, state, action, discs=None):
+        """As `Task.stage_cost`, among as many obstacles elsewhere if that is asked."""
+        data = self._default.copy()
+        if discs is not None:
+            data[self.n : self._width] = np.ravel(discs)
+        self._write(data, state, action)
+        return self.module("task_cost", *self._places("state", "action"))

@@ -1,5 +1,6 @@
 """`nmpcrl wasm`: the controller of a plant, or of a problem, as a WebAssembly module."""
 
+import json
 import sys
 from pathlib import Path
 from pkgutil import resolve_name
@@ -21,10 +22,10 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
     """Compile the solver and the learners to WebAssembly.
 
     The module has the solver, the update rules and the network, and runs in any
-    browser, in Node and in engines such as wasmtime. Target, obstacles, horizon
-    and discount are arguments of its functions; of a Problem, data and theta.
-    Compilation takes a minute or two, once. MODULE:NAME may be a function that
-    returns a Plant, a Task or a Problem.
+    browser, in Node and in engines such as wasmtime. The problem is an argument
+    of its functions: a file beside it, with .json for .wasm, has its numbers as
+    one array, and its sizes. Compilation takes a minute or two, once.
+    MODULE:NAME may be a function that returns a Plant, a Task or a Problem.
 
     \b
     Example:
@@ -35,7 +36,8 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
 
     need_numba("its LLVM compiles to WebAssembly")
 
-    from nmpcrl.control import Plant, Problem, Task
+    from nmpcrl.control import Nmpc, Plant, Problem, Task
+    from nmpcrl.control import browser as alone
     from nmpcrl.control.codegen.source import CannotCompile
     from nmpcrl.learning import browser
     from nmpcrl.study import paper
@@ -50,10 +52,12 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
         if start != states:
             raise click.ClickException(f"the task has {start} states, the plant {states}")
     try:
-        module = browser.module(*of)
+        module, described = browser.module(*of), alone.problem(Nmpc(*of).problem)
     except (CannotCompile, RuntimeError) as error:
         raise click.ClickException(str(error)) from None
     out.write_bytes(module)
+    numbers = {"numbers": alone.packed(described).tolist()}
+    out.with_suffix(".json").write_text(json.dumps(described | numbers))
     name, size = click.format_filename(out), len(module) / 1000
     click.echo(f"{name}: {size:.0f} kB; its host gives it functions of JavaScript's Math.")
 

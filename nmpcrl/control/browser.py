@@ -1,83 +1,66 @@
 """A controller as WebAssembly: the solver that trains every run, for any other host."""
 
 from importlib.resources import files
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from nmpcrl import Vector
 from nmpcrl.control.codegen import browser
-from nmpcrl.control.codegen.source import source
-from nmpcrl.control.ocp import transcribe as transcribe_problem
+from nmpcrl.control.codegen.source import INNER, source
+from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solvers import riccati, stages
-from nmpcrl.control.solvers.charge import DISCS, LONGEST
-from nmpcrl.control.solvers.starts import cold_inputs, random_inputs
 from nmpcrl.control.task import Task
-from nmpcrl.control.units import sizes_in
 
-HEADER = '''"""The RL stage cost of a task, and inputs to start from."""
+ARRAYS = ("data", "lower", "upper", "sides", "kind", "discount", "weights", "others", "drawn")
+CHARGE = '''"""The RL stage cost of a task."""
 
 import math
 
 import numpy as np
 from numba import njit
 
-DISCS, LONGEST = {discs}, {longest}
-WARM_LIMIT, COLD_LIMIT = {warm}, {cold}
-RANDOM_INPUTS = np.array({inputs})
 
+{entered}
 
-@njit(error_model="numpy", forceinline=True)
+{charged}
+
+{inner}def charge(state, action, data):
+    """Eq. (20); data are those of a stage, the target and then three numbers an obstacle."""
+    total = np.zeros(1)
+    for at in range(len(state), len(data), 3):
+        total[0] += entered(state, data[at:])
+    return charged(state, action, data, total)
 '''
-BEGIN = f'''"""What `Riccati` does where nothing is known: the best plan of its cold starts.
+TASK = '''"""What is called of a task: see `entries`."""
 
-But for the one that a `Regulator` holds by feedback.
-"""
+from numba import carray, float64, njit
 
-import numpy as np
-from numba import carray, float64, int32, njit
-
-from .entries import *
-from .settled import COLD_INPUTS
+from .charge import charge
+from .entries import address, unpacked
+from .model import NU, NX
 
 
-@njit(int32(address, address, address, float64, address, address), error_model="numpy")
-def nmpc_begin(data, state, theta, tolerance, out, report):
-    """As `nmpc_solve` with u_0 free and no warm start; the arguments are as there."""
-    end = nmpc_solve(data, state, theta, out, 0, UNKNOWN, out, tolerance, out, report)
-    sizes, (z, lam) = sizes_of(0), lengths(N, ROWS, 0)
-    size, report_ = len(sizes) + NTHETA, carray(report, 5)
-    result, other = carray(out, size), np.empty(size)
-    for k in range(len(COLD_INPUTS) if end == SOLVED else 0):
-        point = np.zeros(2 * z + lam)
-        for i in range(N):
-            for a in range(NU):
-                point[i * (NX + NU + ROWS) + NX + a] = COLD_INPUTS[k, i, a]
-        value, iterations, ended, _, error = solve(
-            carray(data, DATA.shape), LOWER.copy(), UPPER.copy(), KIND[0].copy(),
-            DISCOUNT.copy(), WEIGHTS.copy(), FACTOR, TIE,
-            divided(carray(state, NX), STATES), carray(theta, NTHETA), np.zeros(NU), 0,
-            COLD, COLD_LIMIT, tolerance, point, other,
-        )
-        if int(ended) == SOLVED and value < report_[0] - {riccati.CLEARLY} * abs(report_[0]):
-            report_[0], report_[1], report_[4] = value, iterations, error
-            for j in range(size):
-                result[j] = other[j] * (sizes[j] if j < len(sizes) else 1.0)
-    return end
+@njit(float64(address, address, address), error_model="numpy")
+def task_cost(problem, state, action):
+    """The RL stage cost, Eq. (20), with the target and the obstacles of stage 0."""
+    data = unpacked(problem, 0)[0][0]
+    return charge(carray(state, NX), carray(action, NU), data[0])
 
 
-EXPORTS = (nmpc_begin,)
+EXPORTS = (task_cost,)
 '''
 
 
 def module(of: Plant | Problem, task: Task | None = None) -> bytes:
-    """One WebAssembly module that solves Eq. (2), steps the plant and charges Eq. (20).
+    """One WebAssembly module that solves, of a plant and a task or of a `Problem`.
 
-    Target, obstacles, box, horizon and discount are arguments of its functions, which
-    `solvers.entries` describes; the plant and the rest of the task are compiled in. Of a `Problem`
-    all but data and theta are, and `solvers.rows_entries` and `BEGIN` describe the functions. Made
-    once, in about a minute, and kept with the machine code.
+    Its functions are those of `solvers.entries`, and of `TASK` where there is a task. All numbers
+    that `problem` returns are arguments of the functions. Made once, in about a minute, and kept
+    with the machine code.
 
     Raises:
         CannotCompile: the plant or the task holds an operation that is not known.
@@ -88,90 +71,82 @@ def module(of: Plant | Problem, task: Task | None = None) -> bytes:
 
 
 def texts(of: Plant | Problem, task: Task | None = None) -> dict[str, str]:
-    """What is compiled: the text of each module by its name; a `Problem` has no task."""
-    if isinstance(of, Problem):
-        return _texts_of_problem(of)
-    assert task is not None
-    return _texts_of_task(of, task)
+    """What is compiled: the text of each module by its name; a `Problem` has no task.
+
+    Each function in the `EXPORTS` of a module is exported.
+    """
+    beside = {}
+    if not isinstance(of, Problem):
+        assert task is not None
+        beside = {"charge": charge(task, of.m), "task": TASK}
+        of = task.problem(of, horizon=1, gamma=1.0, slack_weight=1.0)
+    entries = files(riccati.__package__).joinpath("entries.py").read_text("utf-8")
+    return riccati.TEXTS | {"model": stages.write(of.solved), "entries": entries} | beside
 
 
-def _texts_of_task(plant: Plant, task: Task) -> dict[str, str]:
-    here = files(riccati.__package__)
-    return {
-        **{name: riccati.TEXTS[name] for name in (*riccati.STAGES, "solve", "hessian_times")},
-        "model": stages.write(plant),
-        "charge": _charge(plant, task),
-        **{name: here.joinpath(f"{name}.py").read_text("utf-8") for name in ("points", "entries")},
-    }
-
-
-def _texts_of_problem(problem: Problem) -> dict[str, str]:
-    here, solved = files(riccati.__package__), problem.solved
-    names = ("codes", "kernel", "rows", "rows_solve", "rows_slopes")
-    return {
-        **{name: riccati.TEXTS[name] for name in names},
-        **problem_stages.write(solved),
-        "settled": _settled(problem, solved),
-        "points": here.joinpath("points.py").read_text("utf-8"),
-        "entries": here.joinpath("rows_entries.py").read_text("utf-8"),
-        "begin": BEGIN,
-    }
-
-
-def _settled(problem: Problem, solved: Problem) -> str:
-    """The text of the module `settled`."""
-    ocps = [transcribe_problem(problem, fix_action=fixed) for fixed in (False, True)]
-    points = [riccati.ProblemPoint(transcribe_problem(solved, fix_action=fixed), None)
-              for fixed in (False, True)]  # fmt: skip
-    data, lower, upper, free, discount, weights, factor, tie = points[0].problem
-    inputs = [random_inputs(solved, seed, problem.horizon) for seed in range(riccati.PERTURBED)]
-    cold = cold_inputs(solved, problem.horizon, riccati.DEFAULT.starts_of(ocps[0]) - 1)
-    arrays = {
-        "LOWER": lower,
-        "UPPER": upper,
-        "STATES": problem.sizes[0],
-        "INPUTS": problem.sizes[1],
-        "SIZES": np.concatenate([sizes_in(ocp, *problem.sizes) for ocp in ocps]),
-        "DISCOUNT": discount,
-        "WEIGHTS": weights,
-        "KIND": np.array([free, points[1].problem[3]]),
-        "DATA": data,
-        "THETA": problem.theta,
-        "THETA_LOWER": problem.theta_lower,
-        "THETA_UPPER": problem.theta_upper,
-        "RANDOM_INPUTS": np.array(inputs),
-        "COLD_INPUTS": np.reshape(cold, (-1, *inputs[0].shape)),
-    }
-    numbers = {
-        "N": problem.horizon,
-        "ROWS": weights.size,
-        "WARM_LIMIT": riccati.WARM_LIMIT,
-        "COLD_LIMIT": riccati.COLD_LIMIT,
-        "FACTOR": factor,
-        "TIE": tie,
-    }
-    lines = ["from math import inf", "", "import numpy as np", ""]
-    lines += [f"{name} = {number!r}" for name, number in numbers.items()]
-    lines += [
-        f"{name} = np.array({one.ravel().tolist()}, np.{one.dtype}).reshape({one.shape})"
-        for name, one in arrays.items()
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _charge(plant: Plant, task: Task) -> str:
-    """The text of the module `charge`: the signatures are those of `solvers.charge`."""
-    state, action = ca.SX.sym("state", plant.n), ca.SX.sym("action", plant.m)
-    target, discs = ca.SX.sym("target", plant.n), ca.SX.sym("discs", DISCS, 3)
-    cost = task.cost_of(state, action, target, tuple(ca.horzsplit(discs)))
-    names = ["state", "action", "target", "discs"]
-    function = ca.Function("charge", [state, action, target, discs], [cost], names, ["cost"])
-    inputs = [random_inputs(plant, seed, LONGEST) for seed in range(riccati.PERTURBED)]
-    header = HEADER.format(
-        discs=DISCS,
-        longest=LONGEST,
-        warm=riccati.WARM_LIMIT,
-        cold=riccati.COLD_LIMIT,
-        inputs=np.array(inputs).tolist(),
+def charge(task: Task, inputs: int) -> str:
+    """The text of the module `charge`, whose function is Eq. (20) for any target and obstacles."""
+    state, action = ca.SX.sym("state", task.start.size), ca.SX.sym("action", inputs)
+    target, disc = ca.SX.sym("target", task.start.size), ca.SX.sym("disc", 3)
+    total, entered = ca.SX.sym("total"), task.entered(state, *ca.vertsplit(disc))
+    cost = task.cost_of(state, action, target, total)
+    names = ["state", "action", "target", "total"]
+    return CHARGE.format(
+        inner=INNER,
+        entered=_inner("entered", {"state": state, "disc": disc}, entered),
+        charged=_inner("charged", dict(zip(names, (state, action, target, total), strict=True)), cost),
     )
-    return header + source(function)
+
+
+def _inner(name: str, of: dict[str, ca.SX], result: ca.SX) -> str:
+    """The text of a function that machine code calls."""
+    function = ca.Function(name, [*of.values()], [result], [*of], ["result"])
+    return INNER + source(function)
+
+
+def problem(
+    of: Problem, solver: riccati.Riccati = riccati.DEFAULT, *, ties_active: bool = False
+) -> dict[str, Any]:
+    """What a host is given beside the module, as JSON takes it.
+
+    These are the sizes that `solvers.model` names, the units of states and inputs, in which all
+    else is given, and the `ARRAYS`: `riccati.Arguments` with `kind` for u_0 free and given, inputs
+    of the cold starts that are `few` where there is no row, and `drawn` ones. A W of None is
+    infinite.
+    """
+    solved, e = of.solved, of.expressions
+    free, given = (
+        riccati.Compiled(transcribe(solved, fix_action=fixed, ties_active=ties_active), None, solver)
+        for fixed in (False, True)
+    )
+    fixed = e.fixed.numel()
+    parts = free.arguments._asdict() | {
+        "kind": [free.arguments.kind, given.arguments.kind],
+        "weights": np.where(of.soft, of.weights, None),
+        "others": free.others,
+        "drawn": free.drawn,
+        "units": of.sizes[0],
+        "input_units": of.sizes[1],
+    }
+    return {name: np.asarray(part).tolist() for name, part in parts.items()} | {
+        "states": of.states,
+        "inputs": of.inputs,
+        "theta": of.theta.size,
+        "soft": int(of.soft[:fixed].sum()),
+        "fixed": fixed,
+        "per": e.each.numel(),
+        "own": of.own_size,
+        "width": e.line.numel(),
+        "few": len(free.others) if solver.starts else riccati.FEW - 1,
+        "tolerance": solver.tolerance,
+    }
+
+
+def packed(described: dict[str, Any]) -> Vector:
+    """What `problem` describes as the array whose address the module's functions are given."""
+    arrays = {name: np.array(described[name], float) for name in ARRAYS}
+    arrays["weights"][np.isnan(arrays["weights"])] = np.inf
+    lines = (arrays["weights"].size - described["fixed"]) // max(described["per"], 1)
+    counts = [len(arrays[name]) for name in ("sides", "others", "drawn")]
+    head = [len(arrays["discount"]) - 1, lines, *counts, described["tie"]]
+    return np.concatenate([head, *(one.ravel() for one in arrays.values())])

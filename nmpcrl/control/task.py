@@ -196,18 +196,22 @@ class Task(Described):
     def charge(self, inputs: int) -> ca.Function:
         """Eq. (20) in symbols, as a CasADi function of the state and so many inputs."""
         state, action = ca.SX.sym("state", self.start.size), ca.SX.sym("action", inputs)
-        cost = self.cost_of(state, action, self.target, tuple(map(ca.DM, self.discs)))
+        total = ca.sum1(self.entered(state, *map(ca.DM, self.discs)))
+        cost = self.cost_of(state, action, self.target, total)
         given = [state, action, ca.SX.sym("data", 0)]
         return ca.Function("charge", given, [cost], ["state", "action", "data"], ["cost"])
 
-    def cost_of(self, state: ca.SX, action: ca.SX, target: Any, discs: tuple[Any, ...]) -> ca.SX:
-        """Eq. (20) in symbols, for another target and other obstacles than the task's own."""
-        away = state - target
+    def entered(self, state: ca.SX, x: Any, y: Any, clearance: Any) -> ca.SX:
+        """How far the margins of discs are entered, in Xi."""
         plane = state if state.numel() > 1 else ca.vertcat(state, 0)  # where no obstacle stands
-        xi = overlap(plane[0], plane[1], *discs)
-        upsilon = self.penalty * ca.sum1(ca.fmax(0, xi + self.margin))
+        return ca.fmax(0, overlap(plane[0], plane[1], x, y, clearance) + self.margin)
+
+    def cost_of(self, state: ca.SX, action: ca.SX, target: Any, total: Any) -> ca.SX:
+        """Eq. (20) in symbols, for any target and a total of what is `entered`."""
+        away = state - target
         near = ca.norm_2(away) < self.near
-        cost: ca.SX = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), upsilon)
+        far: ca.SX = self.penalty * total
+        cost: ca.SX = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), far)
         return cost
 
 

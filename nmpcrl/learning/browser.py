@@ -4,9 +4,6 @@ from importlib.resources import files
 
 from nmpcrl.control import Plant, Problem, Task, browser
 from nmpcrl.control.codegen.browser import from_texts
-from nmpcrl.control.solvers.charge import DISCS, LONGEST
-
-__all__ = ["DISCS", "LONGEST", "module"]  # at most: obstacles, and steps planned
 
 OWN = ("updates", "rules", "dense", "network_entries")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from nmpcrl.study.parameters import Allowed, need, number, numbers
 
-MOST_OBSTACLES = 16  # of a layout: the controller in the browser has no room for more
+MOST_OBSTACLES = 16  # of a layout: a page has no room for more
 FARTHEST = 100.0  # of a centre from the origin, along an axis [m]
 
 Centres = tuple[tuple[float, float], ...]

@@ -1,8 +1,11 @@
 """`nmpcrl wasm` writes a module, or says in one sentence why not."""
 
+import json
+
 import pytest
 from raising import raising
 
+from nmpcrl.control.browser import packed
 from nmpcrl.learning import browser
 
 MINE = """
@@ -50,6 +53,9 @@ def test_what_is_named_is_compiled(command, asked, tmp_path, line, sizes):
     assert (of.n if task else of.states, of.m if task else of.inputs) == sizes[:2]
     assert [len(one.obstacles) for one in task] == [*sizes[2:]]
     assert (tmp_path / "nmpc.wasm").read_bytes() == b"module"
+    described = json.loads((tmp_path / "nmpc.json").read_text())
+    assert (described["states"], described["inputs"]) == sizes[:2]
+    assert described["numbers"] == packed(described).tolist()
     assert "nmpc.wasm: 0 kB" in result.output
 
 

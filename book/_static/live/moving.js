@@ -5,7 +5,7 @@
   "use strict";
 
   const {
-    add, set, plane, mapParts, weight, trace, key, player, planner, parts: shared, words: { moving: words, parts: common },
+    add, set, plane, mapParts, weight, trace, key, player, solver, parts: shared, words: { moving: words, parts: common },
   } = window.nmpcrl;
   const PACE = 80; // from one step to the next while it plays [ms]
   const AHEAD = 4; // an arrow is as long as the motion in this time [s]
@@ -22,14 +22,15 @@
 
   // An episode of a robot: its states and plans, and how much it was charged and how often it was inside by then.
   // A failed solve ends it, as in `evaluate`.
-  function drive(expect, { movers, theta }, { start, steps, period, problem: { discs } }, nmpc, { plan, horizon }) {
+  function drive(expect, { movers, theta }, { start, steps, period, problem: { discs } }, nmpc, planner) {
     const found = { states: [], plans: [], costs: [], inside: [], failed: false };
     const centres = (step) => movers.map((mover) => at(mover, period * step));
-    let state = start, cost = 0, inside = 0;
+    const stages = [...planner.problem.data.keys()];
+    let state = start, cost = 0, inside = 0, planned = null;
     for (let k = 0; k < steps; k++) {
       const now = centres(k), before = centres(k - 1);
-      const data = Array.from({ length: horizon + 1 }, (_, i) => expect(now, before, i));
-      const planned = plan({ state, theta, data }, k === 0);
+      const data = stages.map((i) => expect(now, before, i).flat());
+      planned = planner.solve({ state, theta, data }, { warm: planned });
       if (!planned) return { ...found, failed: true };
       const around = now.map((place, j) => [...place, discs[j][2]]);
       cost += nmpc.cost({ discs: around }, state, planned.action);
@@ -103,7 +104,7 @@
   }
 
   async function build(figure, data, nmpc) {
-    const planning = await planner(window.nmpcrl.problem_module, data.problem.tolerance);
+    const planning = await solver(window.nmpcrl.problem_module, data.planning);
     const begin = { movers: data.movers, theta: data.theta, step: data.step };
     const { read, move } = shared.state(begin, show);
     const views = Object.keys(data.looks);

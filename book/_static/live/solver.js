@@ -1,5 +1,5 @@
 // The solver that trains every run, in this page: arrays in, plans and the closed loop out.
-// module.js has its WebAssembly; nmpcrl/control/solvers/entries.py describes the functions.
+// module.js has its WebAssembly; nmpcrl/control/solvers/entries.py describes its functions.
 //
 // A function with a name, so that a worker can be given its text.
 (function solving() {
@@ -21,63 +21,82 @@
     return made.instance.exports;
   }
 
-  // Everything that is solved, with up to `problem.most_discs` obstacles and as many planned inputs as
-  // `problem.discount` has room for. What is asked is { state, theta, discs, horizon }, and a `target`
-  // if it is not the problem's.
-  async function solver(packed, problem) {
-    const wasm = await instance(packed);
-    const room = (count) => new Float64Array(wasm.memory.buffer, wasm.reserve(8 * count), count);
-    const filled = (numbers) => {
-      const array = room(numbers.length);
-      array.set(numbers);
-      return array;
-    };
-    const n = problem.target.length, m = problem.lower.length, d = problem.theta;
-    const size = (fixed) => 2 * N * m + 3 * (N + 1) * (n + count) + fixed * m + d; // of a plan's numbers
+  // The numbers of a problem in the order of `packed` in nmpcrl/control/browser.py. `data` are of N + 1 stages, with
+  // any number of lines (obstacles), of which `problem` has the first, as it has the stages of the longest horizon.
+  function packed(problem, data) {
+    const { fixed, per, own, width, sides, lower, upper } = problem;
+    const N = data.length - 1, last = problem.discount.length - 1, lines = width ? (data[0].length - own) / width : 0;
+    const rows = (of) => [
+      ...of.slice(0, fixed), ...Array.from({ length: lines }, () => of.slice(fixed, fixed + per)).flat(),
+    ];
+    const all = (of) => [...rows(of), ...of.slice(of.length - sides.length)];
+    const kind = problem.kind.map((of) => data.map((_, i) => all(of[i < N ? i : last])));
+    const weights = rows(problem.weights).map((one) => one ?? Infinity);
+    const others = problem.others.slice(0, weights.length ? Infinity : problem.few);
+    const starts = [...others, ...problem.drawn].map((inputs) => inputs.slice(0, N));
+    const head = [N, lines, sides.length, others.length, problem.drawn.length, problem.tie];
+    return [head, data, lower, upper, sides, kind, problem.discount.slice(0, N + 1), weights, starts].flat(Infinity);
+  }
 
-    const target = filled(problem.target), lower = filled(problem.lower), upper = filled(problem.upper);
-    const discs = room(3 * problem.most_discs), sides = filled(problem.sides.flat());
-    const discount = filled(problem.discount);
+  const times = (numbers, units) => Array.from(numbers, (each, k) => each * units[k]);
+  const over = (numbers, units) => numbers.map((each, k) => each / units[k]);
+
+  // Everything that is solved. `problem` is what `problem` in nmpcrl/control/browser.py says, and of a task also its
+  // `target`, `discs`, and `most_discs` of what is asked. That is { state, theta, discs, horizon }, and a `target` if
+  // it is not the problem's; of a problem without a task { state, theta, data }, where `data` are of each stage.
+  async function solver(module, problem) {
+    const wasm = await instance(module);
+    const room = (count) => new Float64Array(wasm.memory.buffer, wasm.reserve(8 * count), count);
+    const { states: n, inputs: m, theta: d, units, input_units: inputUnits, own, width, most_discs: most } = problem;
+    const stage = (row, length = problem.data.length) => Array.from({ length }, () => row);
+    const largest = most ? stage(Array(own + width * most).fill(0)) : problem.data;
+
+    const numbers = room(packed(problem, largest).length);
     const state = room(n), next = room(n), theta = room(d), action = room(m), report = room(5);
     const vector = room(d), product = room(d);
-    let N = problem.discount.length - 1, count = problem.most_discs; // of what is asked; at most so many
-    const plan = room(size(FIXED));
+    let known = null, N = 0, slacks = 0; // of what was asked last
+    const hard = problem.fixed - problem.soft;
+    const size = (fixed) => (N + 1) * (3 * (n + slacks) + hard) + 2 * N * m + fixed * m + d; // of a plan's numbers
 
-    function ask(given) {
-      N = given.horizon ?? N;
-      count = given.discs.length;
-      target.set(given.target ?? problem.target);
-      given.discs.forEach((disc, k) => discs.set(disc, 3 * k));
-      if (given.theta) theta.set(given.theta);
-      if (given.state) state.set(given.state);
+    function write({ data, discs, target, horizon }) {
+      const row = discs && [...(target ?? problem.target), ...discs.flat()];
+      const all = data ?? (row ? stage(row, (horizon ?? problem.data.length - 1) + 1) : problem.data);
+      numbers.set(packed(problem, all));
+      N = numbers[0];
+      slacks = problem.soft + problem.per * numbers[1];
     }
 
-    const asked = (fixed) => [
-      N, count, problem.sides.length,
-      target.byteOffset, lower.byteOffset, upper.byteOffset,
-      discs.byteOffset, sides.byteOffset, discount.byteOffset,
-      problem.slack_weight, problem.soft_box, problem.tie,
-      state.byteOffset, theta.byteOffset, action.byteOffset, fixed,
-    ];
+    function ask(given) {
+      const about = [given.data, given.discs, given.target, given.horizon];
+      if (!known?.every((one, k) => one === about[k])) write(given);
+      known = about;
+      if (given.theta) theta.set(given.theta);
+      if (given.state) state.set(over(given.state, units));
+    }
+
+    ask({ data: largest });
+    const plan = room(size(FIXED)), noStates = room((N + 1) * n), noInputs = room(N * m);
+    const places = (...arrays) => arrays.map(({ byteOffset }) => byteOffset);
+    const asked = places(numbers, state, theta, action);
 
     // From the solution that `plan` holds to the one that it then holds; `warm` is its u_0, FREE or FIXED.
     const solveThere = (warm, fixed = FREE) => wasm.nmpc_solve(
-      ...asked(fixed), warm, plan.byteOffset, problem.tolerance, plan.byteOffset, report.byteOffset,
+      ...asked, fixed, warm, plan.byteOffset, problem.tolerance, ...places(plan, report),
     ) === SOLVED;
 
     // What `plan` holds, in JavaScript's own arrays.
     function read(fixed = FREE) {
-      const all = size(fixed), stride = n + m + count;
+      const all = size(fixed), stride = n + m + slacks;
       const from = (at, length) => Array.from(plan.subarray(at, at + length));
       const stages = Array.from({ length: N + 1 }, (_, i) => i * stride);
-      const slacks = stages.flatMap((at, i) => from(at + n + (i < N ? m : 0), count));
+      const beyond = stages.flatMap((at, i) => from(at + n + (i < N ? m : 0), slacks));
       return {
         value: report[0],
         features: from(all - d, d),
-        states: stages.map((at) => from(at, n)),
-        action: from(n, m),
-        nextAction: from((N > 1 ? stride : 0) + n, m),
-        slack: Math.max(0, ...slacks),
+        states: stages.map((at) => times(from(at, n), units)),
+        action: times(from(n, m), inputUnits),
+        nextAction: times(from((N > 1 ? stride : 0) + n, m), inputUnits),
+        slack: Math.max(0, ...beyond),
         iterations: report[1],
         restarts: report[2],
         numbers: plan.slice(0, all),
@@ -89,46 +108,43 @@
     // earlier plan to start from, of the same horizon and as many obstacles.
     function solve(given, { action: fixed = null, warm = null } = {}) {
       ask(given);
-      if (fixed) action.set(fixed);
-      const known = warm?.numbers.length === size(warm?.fixed);
-      if (known) plan.set(warm.numbers);
+      if (fixed) action.set(over(fixed, inputUnits));
+      const same = warm?.numbers.length === size(warm?.fixed);
+      if (same) plan.set(warm.numbers);
       const which = fixed ? FIXED : FREE;
-      return solveThere(known ? warm.fixed : NOTHING, which) ? read(which) : null;
+      return solveThere(same ? warm.fixed : NOTHING, which) ? read(which) : null;
     }
+
+    const stepThere = () => wasm.model_step(...asked, next.byteOffset);
+    const chargeThere = () => wasm.task_cost(...places(numbers, state, action));
 
     // The state one period later.
     function step(from, input) {
-      state.set(from);
-      action.set(input);
-      wasm.plant_step(state.byteOffset, action.byteOffset, next.byteOffset);
-      return Array.from(next);
+      state.set(over(from, units));
+      action.set(over(input, inputUnits));
+      stepThere();
+      return times(next, units);
     }
 
-    const charge = () => wasm.stage_cost(
-      count, discs.byteOffset, target.byteOffset, state.byteOffset, action.byteOffset,
-    );
-
-    // The stage cost that learning minimises.
+    // The stage cost of a task that learning minimises.
     function cost(given, from, input) {
       ask({ ...given, state: from });
       action.set(input);
-      return charge();
+      return chargeThere();
     }
 
     // The Hessian of a plan's value in theta, times a vector; null at no strict minimum.
     function hessianTimes(given, solution, by) {
       ask(given);
-      action.set(solution.action);
+      action.set(over(solution.action, inputUnits));
       plan.set(solution.numbers);
       vector.set(by);
-      const formed = wasm.nmpc_hessian_times(
-        ...asked(solution.fixed), plan.byteOffset, vector.byteOffset, product.byteOffset,
-      );
+      const formed = wasm.nmpc_slopes(...asked, solution.fixed, ...places(plan, vector, noStates, noInputs, product));
       return formed === FORMED ? Array.from(product) : null;
     }
 
-    // The closed loop of a policy from `given.start` without noise, its cost, discounted too, and the first of its plans.
-    // A failed solve ends it, as in `evaluate`.
+    // The closed loop of a task's policy from `given.start` without noise, its cost, discounted too, and the first of
+    // its plans. A failed solve ends it, as in `evaluate`.
     function rollout(given, steps) {
       ask({ ...given, state: given.start });
       const found = { states: [], cost: 0, discounted: 0, plan: null, failed: false };
@@ -136,11 +152,11 @@
         if (!solveThere(k > 0 ? FREE : NOTHING)) return { ...found, failed: true };
         found.plan ??= read();
         action.set(plan.subarray(n, n + m));
-        found.states.push(Array.from(state));
-        const charged = charge();
+        found.states.push(times(state, units));
+        const charged = chargeThere();
         found.cost += charged;
         found.discounted += problem.discount[1] ** k * charged;
-        wasm.plant_step(state.byteOffset, action.byteOffset, next.byteOffset);
+        stepThere();
         state.set(next);
       }
       return found;

@@ -1,121 +1,146 @@
-"""What is called of the solver from outside Python: pointers and plain numbers, no arrays.
+"""What other hosts than Python call: pointers and plain numbers, no arrays.
 
-`codegen.browser` compiles this file beside `kernel`, `hessian`, a `model` of the plant and a
-`charge` of the task, and exports each function of `EXPORTS`. An array is a pointer to its first
-number, in C order. Its shape follows from N, the horizon, M, the number of obstacles, and B, the
-number of sides of the box on the state; the problem's arguments are those of `InteriorPoint`. A
-solution's numbers are z, lam and nu in the order of `Ocp`, and then the gradient of the value.
+`control.browser` compiles this file beside the `model` of a problem and exports each function of
+`EXPORTS`. An array is a pointer to its first number, in C order. A problem is one array, as
+`control.browser.packed` writes it; states, inputs and solutions are in the units in which it is
+solved. A solution's numbers are z, lam and nu in the order of `Ocp`, and then the gradient.
 """
 
 import numpy as np
 from numba import carray, float64, int32, njit, types
 
-from .charge import COLD_LIMIT, DISCS, LONGEST, RANDOM_INPUTS, WARM_LIMIT, charge
 from .codes import End, Start
-from .hessian_times import hessian_times
-from .model import NTHETA, NU, NX, transition
-from .points import carried, equal, lengths
-from .solve import solve
+from .find import find
+from .kernel import inlined
+from .model import FIXED, NTHETA, NU, NX, OWN, PER, SOFT, WIDTH, transition
+from .model import stage_cost as cost_of_stage
+from .slopes import slopes
 
-COLD, SHIFTED, NEAR, SAME = map(int, Start)
+COLD, SHIFTED, _, SAME = map(int, Start)
 SOLVED, UNKNOWN = int(End.SOLVED), -1
-WARM, NEARER, STANDING, RANDOM = range(4)  # the starts in their order; random ones to the end
-ELSEWHERE = (1e9, 1e9, 1.0)  # a disc that costs nothing
+HEAD = 6  # numbers in front of a problem's arrays
 
 address = types.CPointer(float64)
-PROBLEM = (
-    int32, int32, int32,  # N, M, B
-    address, address, address,  # target (NX,), lower and upper (NU,)
-    address, address, address,  # discs (M, 3), sides (B, 3), discount (N + 1,)
-    float64, int32, float64,  # slack_weight, soft_box, tie
-    address, address, address, int32,  # state (NX,), theta (NTHETA,), action (NU,), fixed
-)  # fmt: skip
+AT = (address, address, address, address, int32)  # problem, state, theta, action, fixed
 
 
-@njit(int32(*PROBLEM, int32, address, float64, address, address), error_model="numpy")
+@inlined
+def unpacked(problem, fixed):
+    """`riccati.Arguments`, the cold starts that are compared, and those that come last."""
+    head = carray(problem, HEAD)
+    N, lines, sides = int(head[0]), int(head[1]), int(head[2])
+    others, drawn = int(head[3]), int(head[4])
+    rows, width = FIXED + PER * lines, OWN + WIDTH * lines
+    sizes = (
+        (N + 1) * width, NU, NU, 3 * sides, 2 * (N + 1) * (rows + sides), N + 1, rows,
+        others * N * NU, drawn * N * NU,
+    )  # fmt: skip
+    at = np.full(len(sizes) + 1, HEAD)
+    for k in range(len(sizes)):
+        at[k + 1] = at[k] + sizes[k]
+    numbers = carray(problem, at[-1])
+    kinds = numbers[at[4] : at[5]].reshape(2, N + 1, rows + sides)
+    given = (
+        numbers[at[0] : at[1]].reshape(N + 1, width),
+        numbers[at[1] : at[2]],
+        numbers[at[2] : at[3]],
+        numbers[at[3] : at[4]].reshape(sides, 3),
+        kinds[fixed].astype(np.int64),
+        numbers[at[5] : at[6]],
+        numbers[at[6] : at[7]],
+        head[5],
+    )
+    compared = numbers[at[7] : at[8]].reshape(others, N, NU)
+    return given, compared, numbers[at[8] : at[9]].reshape(drawn, N, NU)
+
+
+@inlined
+def lengths(given, fixed):
+    """Of z and of lam."""
+    data, discount = given[0], given[5]
+    N, slacks = len(discount) - 1, SOFT
+    if WIDTH > 0:
+        slacks += PER * ((data.shape[1] - OWN) // WIDTH)
+    stage = NX + slacks
+    return (N + 1) * stage + N * NU, (N + 1) * (stage + FIXED - SOFT) + fixed * NU
+
+
+@inlined
+def carried(given, fixed, old_fixed, old):
+    """The numbers of a solution as those of the same problem with u_0 fixed or free instead."""
+    (z, lam), (_, old_lam) = lengths(given, fixed), lengths(given, old_fixed)
+    new, moved = np.zeros(2 * z + lam), (old_fixed - fixed) * NU
+    for k in range(z):
+        new[k] = old[k]
+        new[z + lam + k] = old[z + old_lam + k]
+    for k in range(lam):  # the rows of a given u_0 follow those of x_0
+        if k < 2 * NX or k >= 2 * NX + fixed * NU:
+            new[z + k] = old[z + k + (moved if k >= 2 * NX else 0)]
+    return new
+
+
+@njit(int32(*AT, int32, address, float64, address, address), error_model="numpy")
 def nmpc_solve(
-    N, M, B, target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
-    state, theta, action, fixed, warm_fixed, warm_start, tolerance, out, report,
-):  # fmt: skip
-    """V(s), or Q(s, a) if u_0 is fixed, by the starts of `InteriorPoint` in their order.
+    problem, state, theta, action, fixed, warm_fixed, warm_start, tolerance, out, report
+):
+    """V(s), or Q(s, a) if u_0 is fixed: `find`.
 
     `warm_start` holds another solution's numbers, and `warm_fixed` whether its u_0 was fixed, or
-    -1 if there is none. `report` receives the value, the iterations of the last start, the
-    restarts, the violation of the box and the relative error. Returns the `End`, or -1 for a
-    problem with more obstacles or a longer horizon than `charge` provides for.
+    -1 if there is none. `report` receives the value, the iterations, the starts that failed, the
+    violation of hard rows and the relative error. Returns the `End`, or -1 for an infinite value.
     """
-    if M > DISCS or N > LONGEST:
-        return UNKNOWN
-    z, lam = lengths(N, M, fixed)
-    state_, report_ = carray(state, NX), carray(report, 5)
-    standing, point, begin = np.zeros(2 * z + lam), np.zeros(2 * z + lam), COLD
+    given, others, drawn = unpacked(problem, fixed)
+    z, lam = lengths(given, fixed)
+    state_, report_, begin = carray(state, NX), carray(report, 5), COLD
+    point = np.zeros(2 * z + lam)
     if warm_fixed != UNKNOWN:
-        _, old_lam = lengths(N, M, warm_fixed)
-        old = carray(warm_start, 2 * z + old_lam)
-        point = carried(N, M, fixed, warm_fixed, old)
-        begin = SAME if equal(state_, old) else SHIFTED
-    restarts, end = -1, UNKNOWN
-    for attempt in range(RANDOM + len(RANDOM_INPUTS)):
-        start, limit = COLD, COLD_LIMIT
-        if attempt < STANDING:
-            if begin == COLD or (attempt == NEARER and begin == SHIFTED):
-                continue
-            start, limit = (NEAR if attempt == NEARER else begin), WARM_LIMIT
-        else:
-            point = standing
-            for i in range(N if attempt >= RANDOM else 0):
-                for a in range(NU):
-                    point[i * (NX + NU + M) + NX + a] = RANDOM_INPUTS[attempt - RANDOM, i, a]
-        restarts += 1
-        value, iterations, ended, violation, error = solve(
-            carray(target, NX), carray(lower, NU), carray(upper, NU), carray(discs, (M, 3)),
-            carray(sides, (B, 3)), carray(discount, N + 1), slack_weight, soft_box, tie,
-            state_, carray(theta, NTHETA), carray(action, NU), fixed,
-            start, limit, tolerance, point, carray(out, 2 * z + lam + NTHETA),
-        )  # fmt: skip
-        report_[0], report_[1], report_[2] = value, iterations, restarts
-        report_[3], report_[4] = violation, error
-        end = int(ended)
-        if end == SOLVED:
-            break
-    return end
+        old = carray(warm_start, 2 * z + lengths(given, warm_fixed)[1])
+        point, begin = carried(given, fixed, warm_fixed, old), SAME
+        for a in range(NX):
+            if state_[a] != old[a]:
+                begin = SHIFTED
+    value, iterations, end, violation, error, failed = find(
+        *given, state_, carray(theta, NTHETA), carray(action, NU), fixed,
+        others, drawn, begin, tolerance, point, carray(out, 2 * z + lam + NTHETA),
+    )  # fmt: skip
+    report_[0], report_[1], report_[2] = value, iterations, failed
+    report_[3], report_[4] = violation, error
+    return int(end) if end != SOLVED or value < np.inf else UNKNOWN
 
 
-@njit(int32(*PROBLEM, address, address, address), error_model="numpy")
-def nmpc_hessian_times(
-    N, M, B, target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
-    state, theta, action, fixed, solution, vector, out,
-):  # fmt: skip
-    """The Hessian of the value in theta, times a vector (NTHETA,); 0 at no strict minimum."""
-    z, lam = lengths(N, M, fixed)
-    return hessian_times(
-        carray(target, NX), carray(lower, NU), carray(upper, NU), carray(discs, (M, 3)),
-        carray(sides, (B, 3)), carray(discount, N + 1), slack_weight, soft_box, tie,
-        carray(state, NX), carray(theta, NTHETA), carray(action, NU), fixed,
-        carray(solution, 2 * z + lam), carray(vector, NTHETA), carray(out, NTHETA),
+@njit(int32(*AT, address, address, address, address, address), error_model="numpy")
+def nmpc_slopes(
+    problem, state, theta, action, fixed, solution, vector, of_states, of_inputs, out
+):
+    """The Hessian of the value times a vector, plus the gradient of a weighted sum of the plan.
+
+    The weights are of shape (N + 1, NX) and (N, NU), the vector and `out` (NTHETA,). Returns 0 at
+    no strict minimum.
+    """
+    given, _, _ = unpacked(problem, fixed)
+    (z, lam), N = lengths(given, fixed), len(given[5]) - 1
+    return slopes(
+        *given, carray(state, NX), carray(theta, NTHETA), carray(action, NU), fixed,
+        carray(solution, 2 * z + lam), carray(vector, NTHETA),
+        carray(of_states, (N + 1, NX)), carray(of_inputs, (N, NU)), carray(out, NTHETA),
     )  # fmt: skip
 
 
-@njit(int32(address, address, address), error_model="numpy")
-def plant_step(state, action, out):
-    """The state one period later, Eq. (18)."""
-    transition(carray(state, NX), carray(action, NU), carray(out, NX))
+@njit(int32(address, address, address, address, address), error_model="numpy")
+def model_step(problem, state, theta, action, out):
+    """The state that the model predicts with the data of stage 0."""
+    data = unpacked(problem, 0)[0][0]
+    transition(
+        carray(state, NX), carray(action, NU), carray(theta, NTHETA), data[0], carray(out, NX)
+    )
     return 0
 
 
-@njit(float64(int32, address, address, address, address), error_model="numpy")
-def stage_cost(M, discs, target, state, action):
-    """The RL stage cost, Eq. (20); obstacles that are not there lie where they cost nothing.
-
-    nan where there are more than `charge` provides for.
-    """
-    if M > DISCS:
-        return np.nan
-    around, there = np.empty((DISCS, 3)), carray(discs, (M, 3))
-    for j in range(DISCS):
-        for k in range(3):
-            around[j, k] = there[j, k] if j < M else ELSEWHERE[k]
-    return charge(carray(state, NX), carray(action, NU), carray(target, NX), around)
+@njit(float64(address, address, address, address), error_model="numpy")
+def stage_cost(problem, state, theta, action):
+    """l of the problem with the data of stage 0, undiscounted."""
+    data = unpacked(problem, 0)[0][0]
+    return cost_of_stage(carray(state, NX), carray(action, NU), carray(theta, NTHETA), data[0])
 
 
-EXPORTS = (nmpc_solve, nmpc_hessian_times, plant_step, stage_cost)
+EXPORTS = (nmpc_solve, nmpc_slopes, model_step, stage_cost)

@@ -59,7 +59,8 @@ def find(
         if not found or (solved and (less or beyond < violation - LEAVES)):
             value, iterations, ended, violation, error = reached, taken, end, beyond, left
             if found:
-                out[:] = into
+                for k in range(len(out)):
+                    out[k] = into[k]
         if solved and attempt < 2:
             break
         if solved and not found:

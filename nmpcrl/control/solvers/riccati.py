@@ -256,5 +256,6 @@ class Compiled:
         check_shape(warm_start, ocp)
         z, nu = warm_start.primal, warm_start.bound_duals
         lam = np.zeros(ocp.equality.size)
-        lam[ocp.obstacles] = warm_start.constraint_duals[old.obstacles]
+        for here, there in ((ocp.obstacles, old.obstacles), (ocp.hard, old.hard)):
+            lam[here] = warm_start.constraint_duals[there]
         return np.concatenate([z, lam, nu])

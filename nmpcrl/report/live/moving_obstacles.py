@@ -6,14 +6,13 @@ import numpy as np
 from IPython.display import HTML
 
 from nmpcrl import Vector
+from nmpcrl.control import browser
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import begin
 from nmpcrl.study import paper
 from nmpcrl.study.moving import PERIOD, Straight, problem
 
-SCRIPTS = frame.scripts_of(
-    "moving", *frame.MAP, "sliders.js", "charts.js", "player.js", "problem.js"
-)  # fmt: skip
+SCRIPTS = frame.scripts_of("moving", *frame.MAP, "sliders.js", "charts.js", "player.js")
 STYLES = ("moving.css",)
 SCENE = (
     Straight((0.5, 1.0), (0.0, 0.3)),  # across the way, as fast upwards as a robot that gives way
@@ -35,10 +34,11 @@ def moving(theta: Vector | None = None) -> HTML:
         theta: of both, to begin with; that of the paper if absent.
     """
     theta = np.array(paper.THETA_INIT) if theta is None else theta
-    nmpc = paper.controller(paper.task(tuple(one.centre for one in SCENE)))
+    nmpc, planned = paper.controller(paper.task(tuple(one.centre for one in SCENE))), problem(len(SCENE))
 
     def data() -> dict[str, Any]:
         return begin(nmpc, nmpc.task.start, theta) | {
+            "planning": browser.problem(planned),
             "movers": [[*one.centre, *one.velocity] for one in SCENE],
             "period": PERIOD,
             "steps": paper.STEPS,
@@ -46,4 +46,4 @@ def moving(theta: Vector | None = None) -> HTML:
             "looks": LOOKS,
         }
 
-    return frame.solving("moving", nmpc, data, SCRIPTS, STYLES, problem(len(SCENE)))
+    return frame.solving("moving", nmpc, data, SCRIPTS, STYLES, planned)

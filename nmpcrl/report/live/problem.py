@@ -1,13 +1,14 @@
 """What the solver of a live figure is given, and how it is shown: sliders and a map."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Riccati, Task
-from nmpcrl.learning.browser import DISCS
+from nmpcrl.control import Nmpc, Obstacle, Task, browser
 from nmpcrl.study import paper
+from nmpcrl.study.geometry import MOST_OBSTACLES
 
 LONGEST = 20  # steps planned: a longer plan has several minima
 CLOSE = 1.2  # beside the circle of one obstacle, seen close [m]
@@ -16,7 +17,7 @@ WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's ci
 
 
 def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
-    """What the module is given of a problem: `riccati.TaskArguments`, and sizes; u_0 is free.
+    """What `solver.js` is given of a task: `browser.problem` with one obstacle, and its own.
 
     Args:
         nmpc: the problem.
@@ -25,21 +26,12 @@ def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
     Raises:
         CannotCompile: as `Riccati.prepare`.
     """
-    solver = Riccati()
-    longer = Nmpc(
-        nmpc.plant,
-        nmpc.task,
-        longest,
-        nmpc.gamma,
-        nmpc.slack_weight,
-        solver,
-        ties_active=nmpc.ties_active,
-    )
-    problem = solver.prepare(longer.ocp).problem._asdict()
-    return {name: np.asarray(value).tolist() for name, value in problem.items()} | {
-        "tolerance": solver.tolerance,
-        "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1,
-        "most_discs": DISCS,
+    task = replace(nmpc.task, obstacles=(Obstacle(0.0, 0.0),))
+    longer = task.problem(nmpc.plant, longest, nmpc.gamma, nmpc.slack_weight)
+    return browser.problem(longer, ties_active=nmpc.ties_active) | {
+        "target": nmpc.task.target.tolist(),
+        "discs": [list(disc) for disc in zip(*nmpc.task.discs, strict=True)],
+        "most_discs": MOST_OBSTACLES,
     }
 
 

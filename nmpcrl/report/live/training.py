@@ -7,7 +7,6 @@ from typing import Any
 from IPython.display import HTML
 
 from nmpcrl.control import Nmpc, Obstacle
-from nmpcrl.learning.browser import LONGEST
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
 from nmpcrl.report.examples import Example, settings_of
@@ -32,6 +31,7 @@ SETTINGS = (
     "learner", "alpha", "beta", "beta_tdc", "zeta", "decay", "decay_rate", "horizon", "seed",
     "episodes",
 )  # fmt: skip
+LONGEST = 40  # steps planned
 MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
 MOST_OBSTACLES = 8
 CLOSED, BY_HAND = 0.1, 0.05  # theta_c at which no plan, and one, fits through the gap of the lesson
