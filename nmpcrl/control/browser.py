@@ -89,12 +89,11 @@ def charge(task: Task, inputs: int) -> str:
     state, action = ca.SX.sym("state", task.start.size), ca.SX.sym("action", inputs)
     target, disc = ca.SX.sym("target", task.start.size), ca.SX.sym("disc", 3)
     total, entered = ca.SX.sym("total"), task.entered(state, *ca.vertsplit(disc))
-    cost = task.cost_of(state, action, target, total)
-    names = ["state", "action", "target", "total"]
+    given = {"state": state, "action": action, "target": target, "total": total}
     return CHARGE.format(
         inner=INNER,
         entered=_inner("entered", {"state": state, "disc": disc}, entered),
-        charged=_inner("charged", dict(zip(names, (state, action, target, total), strict=True)), cost),
+        charged=_inner("charged", given, task.cost_of(*given.values())),
     )
 
 
@@ -115,10 +114,8 @@ def problem(
     infinite.
     """
     solved, e = of.solved, of.expressions
-    free, given = (
-        riccati.Compiled(transcribe(solved, fix_action=fixed, ties_active=ties_active), None, solver)
-        for fixed in (False, True)
-    )
+    ocps = [transcribe(solved, fix_action=one, ties_active=ties_active) for one in (False, True)]
+    free, given = (riccati.Compiled(ocp, None, solver) for ocp in ocps)
     fixed = e.fixed.numel()
     parts = free.arguments._asdict() | {
         "kind": [free.arguments.kind, given.arguments.kind],

@@ -79,7 +79,7 @@ def learned(data: bytes, experiment: Experiment) -> np.ndarray:
                 moved = rules("gradient_td", theta, w, delta, phi, phi_next, alpha, gamma)
                 w = rules("auxiliary", w, delta, phi, beta)
                 if experiment.learner == "TDC":
-                    product = there.hessian_times(state, theta, plan, old_w)
+                    product = there.slopes(state, theta, plan, old_w)
                     h = rules("curvature", delta, phi, old_w, product)
                     moved = rules("project", moved - alpha * h, *paper.THETA_SET)
                 theta = moved

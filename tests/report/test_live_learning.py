@@ -17,6 +17,7 @@ from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.report.live import frame, two_learners, two_states
 from nmpcrl.report.live.looks import look
 from nmpcrl.study import Experiment, paper
+from nmpcrl.study.geometry import MOST_OBSTACLES
 from nmpcrl.study.setup import prepare
 
 EXPERIMENT = Experiment(layout="C", alpha=3e-8, decay="episode", seed=4, episodes=20, horizon=7)
@@ -90,13 +91,13 @@ def test_both_learners_begin_as_the_experiment_does(figure):
 
 def test_no_script_holds_a_number_of_the_library():
     """They are data, so that a change in Python is one in the page."""
-    numbers = (ABSURD, training.PATIENCE, paper.HIDDEN, paper.BATCH, browser.DISCS)
+    numbers = (ABSURD, training.PATIENCE, paper.HIDDEN, paper.BATCH, MOST_OBSTACLES)
     texts = {path.name: path.read_text() for path in frame.folder().glob("*.js")}
     for name in ("learning.js", "network.js", "solver.js"):
         found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e\d+)?\b", texts[name])
         assert not set(map(float, found)) & set(map(float, numbers)), name
     for name, text in texts.items():
-        assert not re.search(r"\b(ABSURD|PATIENCE|HIDDEN|BATCH|DISCS)\b", text), name
+        assert not re.search(r"\b(ABSURD|PATIENCE|HIDDEN|BATCH)\b", text), name
 
 
 def test_networks_are_fitted_for_sixty_episodes_at_most(monkeypatch):

@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from wasm_host import Controller, Module, ProblemController
+from wasm_host import Controller, Module
 
 from nmpcrl.analysis.encounters import count, judged
+from nmpcrl.control import Nmpc
 from nmpcrl.control import browser as alone
 from nmpcrl.learning import browser
 from nmpcrl.report import live
@@ -65,10 +66,11 @@ def test_the_scene_shows_what_the_chapter_says():
 
 
 @pytest.fixture(scope="module")
-def modules() -> tuple[Controller, ProblemController]:
+def modules() -> tuple[Controller, Controller]:
     nmpc = paper.controller(paper.task([one.centre for one in SCENE]))
     there = Controller(Module(browser.module(nmpc.plant, nmpc.task)), nmpc)
-    return there, ProblemController(Module(alone.module(moving.problem())))
+    planned = moving.problem()
+    return there, Controller(Module(alone.module(planned)), Nmpc(planned))
 
 
 @pytest.mark.slow
@@ -79,11 +81,7 @@ def test_the_modules_drive_as_python_does(modules, view, motions):
     (there, planner), state, plan = modules, np.array(paper.START), None
     states, cost = [], 0.0
     for t in range(paper.STEPS):
-        data = PREDICTORS[view](motions, t)
-        if plan is None:
-            plan = planner.begin(state, THETA, data)
-        else:
-            plan = planner.solve(state, THETA, plan, data=data)
+        plan = planner.solve(state, THETA, plan, data=PREDICTORS[view](motions, t))
         discs = np.column_stack([centres(motions, [t])[0], [moving.CLEARANCE] * len(motions)])
         states.append(state)
         cost += there.cost(state, plan["action"], discs)

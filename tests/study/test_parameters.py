@@ -8,7 +8,6 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.control.solvers.charge import DISCS
 from nmpcrl.study import ParameterError, geometry, paper
 from nmpcrl.study.geometry import MOST_OBSTACLES, centres_of, short_name
 from nmpcrl.study.parameters import (
@@ -155,4 +154,3 @@ def test_a_layout_is_one_word_that_gives_its_centres_back_to_the_last_bit(centre
         assert ALLOWED["layout"].check("layout", same) == word
     assert short_name(word) != short_name(word + " 1,1")
     assert (len(short_name(word)), short_name("A")) == (len("drawn-123456"), "A")
-    assert MOST_OBSTACLES == DISCS  # in the browser

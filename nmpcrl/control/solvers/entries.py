@@ -109,9 +109,7 @@ def nmpc_solve(
 
 
 @njit(int32(*AT, address, address, address, address, address), error_model="numpy")
-def nmpc_slopes(
-    problem, state, theta, action, fixed, solution, vector, of_states, of_inputs, out
-):
+def nmpc_slopes(problem, state, theta, action, fixed, solution, vector, of_states, of_inputs, out):
     """The Hessian of the value times a vector, plus the gradient of a weighted sum of the plan.
 
     The weights are of shape (N + 1, NX) and (N, NU), the vector and `out` (NTHETA,). Returns 0 at

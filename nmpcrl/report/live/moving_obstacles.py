@@ -34,7 +34,8 @@ def moving(theta: Vector | None = None) -> HTML:
         theta: of both, to begin with; that of the paper if absent.
     """
     theta = np.array(paper.THETA_INIT) if theta is None else theta
-    nmpc, planned = paper.controller(paper.task(tuple(one.centre for one in SCENE))), problem(len(SCENE))
+    nmpc = paper.controller(paper.task(tuple(one.centre for one in SCENE)))
+    planned = problem(len(SCENE))
 
     def data() -> dict[str, Any]:
         return begin(nmpc, nmpc.task.start, theta) | {

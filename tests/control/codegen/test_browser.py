@@ -11,14 +11,16 @@ from wasm_host import Controller, Module
 from nmpcrl.control import Nmpc, Obstacle, Plant, Task, browser, differential_drive
 from nmpcrl.control.codegen.browser import FUNCTIONS, build, from_texts, ir, link
 from nmpcrl.control.solvers import stages
-from nmpcrl.control.solvers.charge import DISCS, LONGEST
+from nmpcrl.report.live.training import LONGEST
 from nmpcrl.study import paper
+from nmpcrl.study.geometry import MOST_OBSTACLES
 
 pytestmark = pytest.mark.slow
 
 THETA = np.array(paper.THETA_INIT)
 ROBOT = differential_drive()
-TOLERANCE = 1e-7  # of solves that may end an iteration apart: ten times what they are solved to
+TOLERANCE = 1e-8  # of solves that may end an iteration apart, as they are solved to
+DEGENERATE = 13  # the seed of an optimum for which Python uses dense algebra
 FREE = """from numba import float64, njit
 
 @njit(float64(float64))
@@ -34,7 +36,8 @@ address = types.CPointer(float64)
 
 @njit(int32(address, address, address), error_model="numpy")
 def step(state, action, out):
-    transition(carray(state, NX), carray(action, NU), carray(out, NX))
+    x, u = carray(state, NX), carray(action, NU)
+    transition(x, u, x, u, carray(out, NX))  # neither theta nor data are read
     return 0
 
 EXPORTS = (step,)
@@ -116,8 +119,11 @@ def test_values_gradients_and_products_are_those_of_the_machine_code(robot_modul
     assert differs(their_q, q) < TOLERANCE
     last = ROBOT.step(later, action)
     assert differs(there.solve(last, theta, their_q), nmpc.solve(last, theta, q)) < TOLERANCE
-    product = there.hessian_times(later, theta, their_second, theta)
-    assert relative(product, nmpc.value_hessian_times(second, theta)) < 1e-4
+    product = there.slopes(later, theta, their_second, theta)
+    if seed == DEGENERATE:
+        assert product is None
+    else:
+        assert relative(product, nmpc.value_hessian_times(second, theta)) < 1e-4
 
 
 def test_where_a_start_fails_the_next_one_is_tried_in_the_same_order(robot_module):
@@ -129,8 +135,7 @@ def test_where_a_start_fails_the_next_one_is_tried_in_the_same_order(robot_modul
         rng = np.random.default_rng(seed)
         first = nmpc.solve(state, theta)
         broken = replace(first, point=first.point * np.nan)
-        numbers = np.concatenate([broken.point, first.features])
-        known = {"fixed": 0, "numbers": numbers}
+        known = {"fixed": 0, "numbers": broken.point}
         later = state + rng.normal(scale=0.1, size=3)
         expected, found = nmpc.solve(later, theta, broken), there.solve(later, theta, known)
         assert found["restarts"] == expected.restarts
@@ -145,7 +150,7 @@ def test_a_module_asks_its_host_for_four_functions(robot_module):
 
 def test_two_builds_give_the_same_bytes(monkeypatch):
     """The plant's step alone goes through every stage, in seconds instead of a minute."""
-    texts = {"model": stages.write(ROBOT), "one": STEP}
+    texts = {"model": stages.write(paper.nmpc("A").problem), "one": STEP}
     monkeypatch.setattr(build, "_kept", lambda called: None)
     assert from_texts(texts) == from_texts(texts)
 
@@ -163,19 +168,9 @@ def test_what_was_made_once_is_kept_and_damage_is_noticed(tmp_path, monkeypatch)
     assert from_texts(texts) == first
 
 
-def test_more_obstacles_or_stages_than_there_is_room_for_are_refused(robot_module):
+def test_the_largest_layout_fits_and_a_host_that_reserves_too_much_is_told(robot_module):
     module = Module(robot_module)
-    for horizon, count in ((LONGEST + 1, 1), (5, DISCS + 1)):
-        obstacles = tuple(Obstacle(0.5 * k, -2.0) for k in range(count))
-        nmpc = Nmpc(ROBOT, replace(paper.task("A"), obstacles=obstacles), horizon=horizon)
-        with pytest.raises(ArithmeticError, match="-1"):
-            Controller(module, nmpc).solve(nmpc.task.start, THETA)
-    assert np.isnan(Controller(module, nmpc).cost(nmpc.task.start, np.zeros(2)))
-
-
-def test_the_largest_problem_fits_and_a_host_that_reserves_too_much_is_told(robot_module):
-    module = Module(robot_module)
-    obstacles = tuple(Obstacle(0.4 * k, 6.0) for k in range(DISCS))
+    obstacles = tuple(Obstacle(0.4 * k, 6.0) for k in range(MOST_OBSTACLES))
     nmpc = Nmpc(ROBOT, replace(paper.task("A"), obstacles=obstacles), horizon=LONGEST)
     there = Controller(module, nmpc)
     start = nmpc.task.start
