@@ -19,16 +19,16 @@ RUNS = [
         ("ES", "A", "episode", {"seed": 3, "alpha": 3e-8}),
         ("GES", "D", "step", {"seed": 1}),
         ("GES", "E", "step", {}),
-        ("TDC", "D", "episode", {"seed": 2}),
+        ("TDC", "D", "episode", {"seed": 1}),
         ("QL", "D", "step", {"constrained": True}),
     )
 ]
 
 # What Python's own runs allow. Where the last bit of alpha is another, or the processor, ES and GES
 # differ from themselves by up to 3e-14 here; QL by 2e-9, since an action may take the robot to an
-# obstacle's edge, where the value has a kink; and TDC by 7e-9, since products with the Hessian may
-# have no more than four digits where constraints are active. The two runs of QL agree to 8e-10.
-DIGITS = {"ES": 1e-12, "GES": 1e-12, "QL": 1e-9, "TDC": 1e-8}
+# obstacle's edge, where the value has a kink; and TDC by more than 1e-10, since products with the
+# Hessian lose digits where constraints are active. The two runs of QL agree to 8e-10.
+DIGITS = {"ES": 1e-12, "GES": 1e-12, "QL": 1e-9, "TDC": 1e-9}
 
 
 class Rules:
