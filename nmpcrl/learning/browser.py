@@ -5,7 +5,7 @@ from importlib.resources import files
 from nmpcrl.control import Plant, Problem, Task, browser
 from nmpcrl.control.codegen.browser import from_texts
 
-OWN = ("updates", "rules", "dense", "network_entries")
+OWN = ("updates", "loop", "rules", "dense", "network_entries")
 
 
 def module(of: Plant | Problem, task: Task | None = None) -> bytes:

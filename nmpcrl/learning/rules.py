@@ -1,40 +1,22 @@
 """The update rules for hosts other than Python: the functions of `updates`, on pointers.
 
-`browser` compiles this file beside `updates` itself. A vector is a pointer to its d numbers; `out`
+`browser` compiles this file beside `loop` and `updates`. A vector is a pointer to its d numbers; `out`
 may be one of the arguments.
 """
 
-from types import FunctionType
-
 from numba import carray, float64, int32, njit, types
 
-from .updates import (
-    auxiliary_step,
-    curvature_correction,
-    gradient_td_step,
-    project,
-    semi_gradient_step,
-    td_error,
+from .loop import (
+    _auxiliary_step,
+    _curvature_correction,
+    _gradient_td_step,
+    _project,
+    _semi_gradient_step,
+    _td_error,
+    plain,
 )
 
 address = types.CPointer(float64)
-plain = njit(error_model="numpy")
-
-
-def positional(function):
-    """The function with its keywords by position: numba takes none that come after a star."""
-    code = function.__code__
-    count = code.co_argcount + code.co_kwonlyargcount
-    code = code.replace(co_argcount=count, co_kwonlyargcount=0)
-    return plain(FunctionType(code, function.__globals__, function.__name__))
-
-
-_auxiliary_step = plain(auxiliary_step)
-_curvature_correction = plain(curvature_correction)
-_gradient_td_step = positional(gradient_td_step)
-_project = plain(project)
-_semi_gradient_step = plain(semi_gradient_step)
-_td_error = plain(td_error)
 
 
 @plain
