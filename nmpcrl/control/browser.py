@@ -30,10 +30,10 @@ from numba import njit
 
 {inner}def charge(state, action, data):
     """Eq. (20); data are those of a stage, the target and then three numbers an obstacle."""
-    total = np.zeros(1)
+    total = 0.0
     for at in range(len(state), len(data), 3):
-        total[0] += entered(state, data[at:])
-    return charged(state, action, data, total)
+        total += entered(state, data[at:])
+    return charged(state, action, data, (total,))
 '''
 TASK = '''"""What is called of a task: see `entries`."""
 

@@ -9,22 +9,20 @@ solved. A solution's numbers are z, lam and nu in the order of `Ocp`, and then t
 import numpy as np
 from numba import carray, float64, int32, njit, types
 
-from .codes import End, Start
 from .find import find
-from .kernel import inlined
+from .kernel import COLD, SAME, SHIFTED, SOLVED, allocating
 from .model import FIXED, NTHETA, NU, NX, OWN, PER, SOFT, WIDTH, transition
 from .model import stage_cost as cost_of_stage
 from .slopes import slopes
 
-COLD, SHIFTED, _, SAME = map(int, Start)
-SOLVED, UNKNOWN = int(End.SOLVED), -1
+UNKNOWN = -1
 HEAD = 6  # numbers in front of a problem's arrays
 
 address = types.CPointer(float64)
 AT = (address, address, address, address, int32)  # problem, state, theta, action, fixed
 
 
-@inlined
+@allocating
 def unpacked(problem, fixed):
     """`riccati.Arguments`, the cold starts that are compared, and those that come last."""
     head = carray(problem, HEAD)
@@ -54,7 +52,7 @@ def unpacked(problem, fixed):
     return given, compared, numbers[at[8] : at[9]].reshape(drawn, N, NU)
 
 
-@inlined
+@allocating
 def lengths(given, fixed):
     """Of z and of lam."""
     data, discount = given[0], given[5]
@@ -65,7 +63,7 @@ def lengths(given, fixed):
     return (N + 1) * stage + N * NU, (N + 1) * (stage + FIXED - SOFT) + fixed * NU
 
 
-@inlined
+@allocating
 def carried(given, fixed, old_fixed, old):
     """The numbers of a solution as those of the same problem with u_0 fixed or free instead."""
     (z, lam), (_, old_lam) = lengths(given, fixed), lengths(given, old_fixed)
