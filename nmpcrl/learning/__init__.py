@@ -5,13 +5,12 @@ result by a rollout without noise.
 """
 
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
-from nmpcrl.learning.batches import Batched, batch_semi_gradient, lstd_q
+from nmpcrl.learning.batches import batch_semi_gradient, batched, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
 from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.learning.learners import (
     Learner,
-    Rule,
     Update,
     UpdateRule,
     Weights,
@@ -45,7 +44,6 @@ from nmpcrl.learning.updates import (
 
 __all__ = [
     "Adam",
-    "Batched",
     "Bootstrap",
     "Descent",
     "Diverged",
@@ -58,7 +56,6 @@ __all__ = [
     "Optimiser",
     "QNetwork",
     "Rollout",
-    "Rule",
     "SecondSolve",
     "Step",
     "Transition",
@@ -69,6 +66,7 @@ __all__ = [
     "as_gymnasium",
     "auxiliary_step",
     "batch_semi_gradient",
+    "batched",
     "count_episodes",
     "count_steps",
     "curvature_correction",

@@ -16,7 +16,6 @@ from nmpcrl import Vector
 from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import (
     Learner,
-    Rule,
     UpdateRule,
     gradient_td,
     semi_gradient,
@@ -48,17 +47,17 @@ def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -
         alpha: step size of ES.
         rng: draws the directions.
     """
-    rule = as_far_as(semi_gradient(alpha), Rule(partial(_anywhere, rng)))
+    rule = as_far_as(semi_gradient(alpha), UpdateRule(partial(_anywhere, rng)))
     return two_solves("random", nmpc, rule)
 
 
-def as_far_as(length: UpdateRule, direction: UpdateRule) -> Rule:
+def as_far_as(length: UpdateRule, direction: UpdateRule) -> UpdateRule:
     """Move theta as far as `length` does, which has the memory, in the direction of another rule.
 
     That one has no memory.
     """
     step = partial(_as_far_as, length, direction)  # copies its rules; a closure would share a `rng`
-    return Rule(step, length.init, length.interrupted)
+    return UpdateRule(step, length.init, length.interrupted)
 
 
 def _as_far_as(

@@ -5,21 +5,21 @@ means, and an optimiser moves theta.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
-from nmpcrl.learning.learners import Learner, Weights, theta_bounds, two_solves, unchanged
+from nmpcrl.learning.learners import Learner, UpdateRule, Weights, theta_bounds, two_solves
 from nmpcrl.learning.optimisers import Bounds, GaussNewton, Optimiser
 
 Statistics = tuple[Any, ...]  # arrays
 
 
 class Batch(NamedTuple):
-    """The memory of a `Batched` rule."""
+    """The memory of a `batched` rule."""
 
     steps: int  # since theta was moved
     sums: Statistics  # of their statistics; empty before the first
@@ -31,46 +31,65 @@ def means_themselves(*means: Any) -> Statistics:
     return means
 
 
-@dataclass(frozen=True, eq=False)
-class Batched:
-    """An `UpdateRule` that moves theta by the mean statistics of a batch."""
+def batched(
+    sample: Callable[[Transition, float], Statistics],
+    optimiser: Optimiser,
+    every: int | None = None,
+    estimate: Callable[..., Statistics] = means_themselves,
+) -> UpdateRule:
+    """A rule that moves theta by the mean statistics of a batch.
 
-    sample: Callable[[Transition, float], Statistics]  # of a step and its TD error
-    optimiser: Optimiser
-    every: int | None = None  # steps of a batch; those of an episode if None
-    estimate: Callable[..., Statistics] = means_themselves  # of means: gradient[, curvature]
-
-    interrupted = staticmethod(unchanged)
-
-    def __post_init__(self) -> None:
-        if self.every is not None and self.every < 1:
-            raise ValueError(f"every = {self.every} must be at least 1, or None for an episode")
-
-    def init(self, weights: Weights) -> Batch:
-        """An empty batch."""
-        return Batch(0, (), self.optimiser.init(weights.theta))
-
-    def step(
-        self, theta: Vector, memory: Batch, transition: Transition, delta: float, _: NextValue
-    ) -> tuple[Vector, Batch]:
-        """Add to the sums; move theta and begin anew where the batch is full."""
-        found, count = self.sample(transition, delta), memory.steps + 1
-        sums = tuple(map(np.add, memory.sums, found)) if memory.sums else found
-        if not (transition.last if self.every is None else count == self.every):
-            return theta, Batch(count, sums, memory.optimiser)
-        estimate = self.estimate(*(one / count for one in sums))
-        theta, optimiser = self.optimiser.step(theta, memory.optimiser, *estimate)
-        return theta, Batch(0, (), optimiser)
+    Args:
+        sample: the statistics of a transition with its TD error.
+        optimiser: moves theta.
+        every: steps of a batch; those of an episode if absent.
+        estimate: a gradient, and a curvature if the optimiser takes one, from the means.
+    """
+    if every is not None and every < 1:
+        raise ValueError(f"every = {every} must be at least 1, or None for an episode")
+    step = partial(_batched, sample, optimiser, every, estimate)
+    return UpdateRule(step, partial(_empty, optimiser))
 
 
-def batch_semi_gradient(optimiser: Optimiser, every: int | None = None) -> Batched:
+def _empty(optimiser: Optimiser, weights: Weights) -> Batch:
+    return Batch(0, (), optimiser.init(weights.theta))
+
+
+def _batched(
+    sample: Any, optimiser: Optimiser, every: int | None, estimate: Any,
+    theta: Vector, memory: Batch, transition: Transition, delta: float, _: NextValue,
+) -> tuple[Vector, Batch]:  # fmt: skip
+    """Add to the sums; move theta and begin anew where the batch is full."""
+    found, count = sample(transition, delta), memory.steps + 1
+    sums = tuple(map(np.add, memory.sums, found)) if memory.sums else found
+    if not (transition.last if every is None else count == every):
+        return theta, Batch(count, sums, memory.optimiser)
+    theta, after = optimiser.step(theta, memory.optimiser, *estimate(*(s / count for s in sums)))
+    return theta, Batch(0, (), after)
+
+
+def td_gradient(transition: Transition, delta: float) -> Statistics:
+    """-delta phi, the semi-gradient of the squared TD error, halved."""
+    return (-delta * transition.solution.features,)
+
+
+def td_curvature(curved: Controller | None, transition: Transition, delta: float) -> Statistics:
+    """-delta phi and phi phi', less delta d^2 Q / dtheta^2 where a controller knows the Hessian."""
+    phi = transition.solution.features
+    hessian = np.outer(phi, phi)
+    if curved is not None:
+        hessian = hessian - delta * curved.value_hessian(transition.solution)
+    return -delta * phi, hessian
+
+
+def batch_semi_gradient(optimiser: Optimiser, every: int | None = None) -> UpdateRule:
     """The mean of the semi-gradients, -delta phi, is what the optimiser descends.
 
     Args:
         optimiser: `Descent`, with momentum or without, or `Adam`.
         every: steps of a batch; those of an episode if absent.
     """
-    return Batched(lambda one, delta: (-delta * one.solution.features,), optimiser, every)
+    return batched(td_gradient, optimiser, every)
 
 
 def lstd_q(
@@ -101,14 +120,7 @@ def lstd_q(
         optimiser: of g and H, such as `TrustRegion`; `GaussNewton` with the arguments above if
             absent.
     """
-
-    def sample(transition: Transition, delta: float) -> Statistics:
-        phi = transition.solution.features
-        hessian = np.outer(phi, phi)
-        if curvature:
-            hessian = hessian - delta * nmpc.value_hessian(transition.solution)
-        return -delta * phi, hessian
-
     bounds = bounds or theta_bounds(nmpc)
-    rule = Batched(sample, optimiser or GaussNewton(alpha, regularisation, bounds), every)
+    sample = partial(td_curvature, nmpc if curvature else None)
+    rule = batched(sample, optimiser or GaussNewton(alpha, regularisation, bounds), every)
     return two_solves("LSTD-Q", nmpc, rule, bounds, values_actions=True)

@@ -16,7 +16,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.control.derivatives import StageDerivatives
 from nmpcrl.learning.bootstrap import Transition
-from nmpcrl.learning.learners import Learner, Weights, theta_bounds, unchanged
+from nmpcrl.learning.learners import Learner, UpdateRule, Weights, theta_bounds
 from nmpcrl.learning.optimisers import Bounds, Optimiser
 from nmpcrl.learning.policy_gradient import no_successor
 
@@ -32,7 +32,7 @@ class Sensitivities(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """An `UpdateRule` that moves theta after each episode by a Gauss-Newton step on J.
+    """The functions of a rule that moves theta after each episode by a Gauss-Newton step on J.
 
     J is the summed cost of the episode as it went; its curvature is the sum of y' l_yy y with
     y = (ds/dtheta, da/dtheta). Model, cost and policy of the plan are differentiated exactly.
@@ -41,8 +41,6 @@ class ClosedLoop:
     nmpc: Nmpc
     optimiser: Optimiser
     derivatives: StageDerivatives
-
-    interrupted = staticmethod(unchanged)
 
     def init(self, weights: Weights) -> Sensitivities:
         """The start does not depend on theta."""
@@ -90,5 +88,6 @@ def closed_loop(
     Raises:
         ValueError: the `Nmpc` is of a `Problem`, and there is no cost.
     """
-    rule = ClosedLoop(nmpc, optimiser, StageDerivatives(nmpc, cost))
+    own = ClosedLoop(nmpc, optimiser, StageDerivatives(nmpc, cost))
+    rule = UpdateRule(own.step, own.init)
     return Learner("GN-J", no_successor, rule, nmpc.gamma, bounds or theta_bounds(nmpc))

@@ -17,7 +17,7 @@ LSTD-Q is in `batches`, DPG in `policy_gradient`, and the control arms are in `b
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,9 @@ if TYPE_CHECKING:
     from nmpcrl.learning.network import QNetwork
 
 
+Follow = Callable[[Vector, float, Vector], Vector]  # (w, delta, phi) -> the next w
+
+
 @dataclass(frozen=True, eq=False)
 class Weights:
     """theta, and the memory of the update rule: `Weights(theta)` begins a run."""
@@ -58,30 +61,6 @@ class Weights:
             object.__setattr__(self, "w", np.zeros(np.shape(self.theta)))
 
 
-class UpdateRule(Protocol):
-    """How theta moves, as an optimiser of optax: memory is an argument and a result of each step.
-
-    So one learner serves many runs, and a run goes on from the weights of any of its steps.
-    """
-
-    def init(self, weights: Weights, /) -> Any:
-        """The memory before the first step; gradient TD begins with `weights.w`."""
-
-    def step(
-        self,
-        theta: Vector,
-        memory: Any,
-        transition: Transition,
-        delta: float,
-        successor: NextValue,
-        /,
-    ) -> tuple[Vector, Any]:
-        """The next theta and memory; `transition` says whether an episode begins or is over."""
-
-    def interrupted(self, theta: Vector, memory: Any, /) -> tuple[Vector, Any]:
-        """The same after an episode that a failed solve ended, which may have had no step."""
-
-
 def no_memory(weights: Weights) -> None:
     """The memory of a rule without one."""
 
@@ -92,16 +71,20 @@ def unchanged(theta: Vector, memory: Any) -> tuple[Vector, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Rule:
-    """An `UpdateRule` made of functions.
+class UpdateRule:
+    """How theta moves, as an optimiser of optax: memory is an argument and a result of each step.
+
+    So one learner serves many runs, and a run goes on from the weights of any of its steps.
 
     >>> step = lambda theta, memory, transition, delta, successor: (theta + 0.1, memory)
-    >>> Rule(step).step(1.0, None, None, 0.0, None)
+    >>> UpdateRule(step).step(1.0, None, None, 0.0, None)
     (1.1, None)
     """
 
+    # (theta, memory, transition, TD error, next value) -> the next theta and memory
     step: Callable[[Vector, Any, Transition, float, NextValue], tuple[Vector, Any]]
-    init: Callable[[Weights], Any] = no_memory
+    init: Callable[[Weights], Any] = no_memory  # before the first step
+    # (theta, memory) -> the same, after an episode that a failed solve ended, perhaps at once
     interrupted: Callable[[Vector, Any], tuple[Vector, Any]] = unchanged
 
     @property
@@ -135,9 +118,9 @@ def auxiliary_weights(memory: Any) -> Vector | None:
     return memory and memory.w
 
 
-def projected(rule: UpdateRule, bounds: tuple[Any, Any]) -> Rule:
+def projected(rule: UpdateRule, bounds: tuple[Any, Any]) -> UpdateRule:
     """A rule whose theta is projected into bounds, (least, most), after each step."""
-    return Rule(partial(_projected, rule, bounds), rule.init, rule.interrupted)
+    return UpdateRule(partial(_projected, rule, bounds), rule.init, rule.interrupted)
 
 
 def _projected(rule: UpdateRule, bounds: tuple[Any, Any], *given: Any) -> tuple[Vector, Any]:
@@ -166,10 +149,10 @@ class Learner:
     values_actions: bool = False  # whether it is meant for Q(s, a), and not for V(s)
 
     def __post_init__(self) -> None:
-        if not all(hasattr(self.rule, name) for name in ("init", "step", "interrupted")):
-            raise ValueError(f"rule = {self.rule!r} must have init, step and interrupted: write"
-                             " Rule(step), step(theta, memory, transition, delta, successor) ->"
-                             " (theta, memory)")  # fmt: skip
+        if not isinstance(self.rule, UpdateRule):
+            raise ValueError(f"rule = {self.rule!r} must be an UpdateRule: write UpdateRule(step),"
+                             " with step(theta, memory, transition, delta, successor) -> (theta,"
+                             " memory)")  # fmt: skip
 
     def step(self, weights: Weights, transition: Transition) -> Update:
         """Value the next state, form the TD error, and move the weights.
@@ -214,9 +197,9 @@ def theta_bounds(nmpc: Any) -> Bounds | None:
     return problem.theta_lower, problem.theta_upper
 
 
-def semi_gradient(alpha: float) -> Rule:
+def semi_gradient(alpha: float) -> UpdateRule:
     """Eq. (9): move theta along delta phi."""
-    return Rule(built_in(Moves(alpha), _semi_gradient, alpha))
+    return UpdateRule(built_in(Moves(alpha), _semi_gradient, alpha))
 
 
 def _semi_gradient(
@@ -225,19 +208,19 @@ def _semi_gradient(
     return semi_gradient_step(theta, delta, transition.solution.features, alpha), memory
 
 
-def gradient_td(alpha: float, beta: float, gamma: float) -> Rule:
+def gradient_td(alpha: float, beta: float, gamma: float) -> UpdateRule:
     """Eq. (16): move theta and w, both from the old ones."""
     step = partial(_gradient_td, alpha, gamma, partial(auxiliary_step, beta=beta))
-    return Rule(built_in(Moves(alpha, beta, gamma), step), first_w)
+    return UpdateRule(built_in(Moves(alpha, beta, gamma), step), first_w)
 
 
-def tracking(alpha: float, gamma: float, follow: Callable[[Vector, float, Vector], Vector]) -> Rule:
-    """Gradient TD with any step of w: `follow` takes w, delta and phi and returns the next w."""
-    return Rule(partial(_gradient_td, alpha, gamma, follow), first_w)
+def tracking(alpha: float, gamma: float, follow: Follow) -> UpdateRule:
+    """Gradient TD with another step of w."""
+    return UpdateRule(partial(_gradient_td, alpha, gamma, follow), first_w)
 
 
 def _gradient_td(
-    alpha: float, gamma: float, follow: Callable[[Vector, float, Vector], Vector],
+    alpha: float, gamma: float, follow: Follow,
     theta: Vector, memory: Auxiliary, transition: Transition, delta: float, successor: NextValue,
 ) -> tuple[Vector, Auxiliary]:  # fmt: skip
     if successor.features is None:
@@ -281,8 +264,7 @@ def deep_expected_sarsa(
 
     `options` are those of `Imitation`.
     """
-    bootstrap = Imitation(network, with_theta=False, **options)
-    return Learner("DES", bootstrap, semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
+    return _imitating("DES", nmpc, Imitation(network, with_theta=False, **options), alpha)
 
 
 def regularized_deep_expected_sarsa(
@@ -292,8 +274,11 @@ def regularized_deep_expected_sarsa(
 
     Eqs. (9), (10) and (11); `options` are those of `Imitation`.
     """
-    bootstrap = Imitation(network, with_theta=True, **options)
-    return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
+    return _imitating("RDES", nmpc, Imitation(network, with_theta=True, **options), alpha)
+
+
+def _imitating(name: str, nmpc: Controller, bootstrap: Imitation, alpha: float) -> Learner:
+    return Learner(name, bootstrap, semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
 
 
 def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:

@@ -6,13 +6,13 @@ which is compatible: with it the gradient of the return is exact (Silver et al. 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.learning.batches import Batched, Statistics
+from nmpcrl.learning.batches import Statistics, batched
 from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import Learner, theta_bounds
 from nmpcrl.learning.optimisers import Bounds, Descent, Optimiser
@@ -81,30 +81,32 @@ def no_successor(transition: Transition, theta: Vector) -> NextValue:
     return NextValue(np.nan)
 
 
-@dataclass(frozen=True, eq=False)
-class PolicyGradientSample:
-    """The statistics of one step."""
+def policy_statistics(
+    nmpc: Controller, features: Features, transition: Transition, _: float
+) -> Statistics:
+    """What one step adds to `CriticMeans`.
 
-    nmpc: Controller
-    features: Features
+    Raises:
+        ValueError: u_0 was fixed, so that the solution has no policy.
+    """
+    solution = transition.solution
+    if solution.ocp.fixed_action.size:
+        raise ValueError(
+            "a policy gradient needs the plan with u_0 free: call train without constrained"
+        )
+    jacobian = nmpc.policy_jacobian(solution)
+    phi = features(transition.state)
+    phi_next = np.zeros_like(phi) if transition.end else features(transition.next_state)
+    psi = compatible_features(jacobian, transition.action - solution.action)
+    own = critic_statistics(phi, phi_next, psi, transition.cost, nmpc.gamma)
+    return (*own, jacobian.T @ jacobian)
 
-    def __call__(self, transition: Transition, delta: float) -> Statistics:
-        """Those of `CriticMeans`.
 
-        Raises:
-            ValueError: u_0 was fixed, so that the solution has no policy.
-        """
-        solution = transition.solution
-        if solution.ocp.fixed_action.size:
-            raise ValueError(
-                "a policy gradient needs the plan with u_0 free: call train without constrained"
-            )
-        jacobian = self.nmpc.policy_jacobian(solution)
-        phi = self.features(transition.state)
-        phi_next = np.zeros_like(phi) if transition.end else self.features(transition.next_state)
-        psi = compatible_features(jacobian, transition.action - solution.action)
-        own = critic_statistics(phi, phi_next, psi, transition.cost, self.nmpc.gamma)
-        return (*own, jacobian.T @ jacobian)
+def natural_statistics(regularisation: float, *found: Any) -> Statistics:
+    """The gradient, and the mean of dpi'dpi for a curvature, from `CriticMeans`."""
+    means = CriticMeans(*found)
+    w = lstd_advantage(means, lstd_value(means, regularisation), regularisation)
+    return policy_gradient_estimate(means.fisher, w), means.fisher
 
 
 def policy_gradient(
@@ -134,13 +136,7 @@ def policy_gradient(
         regularisation: of the two least-squares fits.
         bounds: the least and the largest theta; those of a `Problem` if absent.
     """
-
-    def estimate(*found: Any) -> Statistics:
-        means = CriticMeans(*found)
-        v = lstd_value(means, regularisation)
-        w = lstd_advantage(means, v, regularisation)
-        return policy_gradient_estimate(means.fisher, w), means.fisher
-
-    sample = PolicyGradientSample(nmpc, features)
-    rule = Batched(sample, optimiser or Descent(alpha), every, estimate)
+    sample = partial(policy_statistics, nmpc, features)
+    estimate = partial(natural_statistics, regularisation)
+    rule = batched(sample, optimiser or Descent(alpha), every, estimate)
     return Learner("DPG", no_successor, rule, nmpc.gamma, bounds or theta_bounds(nmpc))

@@ -22,7 +22,6 @@ from nmpcrl.learning.baselines import as_far_as
 from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import (
     Learner,
-    Rule,
     UpdateRule,
     Weights,
     first_w,
@@ -79,7 +78,7 @@ def guarded(learner: Learner, alpha: float) -> Learner:
         ValueError: its rule is not proportional to alpha, since it moves theta by batches.
     """
     rule = _of_each_step(learner, "a guard")
-    own = replace(rule, step=partial(_guarded, rule, alpha))
+    own = UpdateRule(partial(_guarded, rule, alpha), rule.init, rule.interrupted)
     return replace(learner, name=f"{learner.name} guarded", rule=own)
 
 
@@ -97,54 +96,49 @@ def directed(learner: Learner, alpha: float) -> Learner:
     return replace(learner, name=f"{learner.name} directed", rule=rule)
 
 
-def _of_each_step(learner: Learner, who: str) -> Rule:
+def _of_each_step(learner: Learner, who: str) -> UpdateRule:
     """The rule of a learner, which has no memory but w."""
-    rule = learner.rule
-    if not isinstance(rule, Rule) or rule.init not in (no_memory, first_w):
+    if learner.rule.init not in (no_memory, first_w):
         raise ValueError(f"{who} needs a rule that moves theta at every step; {learner.name} has a"
                          " memory")  # fmt: skip
-    return rule
+    return learner.rule
 
 
 class Mean(NamedTuple):
-    """The memory of `Averaging`."""
+    """The memory of an `averaged` rule."""
 
     theta: Vector  # the mean
     steps: int  # in all
     inner: Any
 
 
-@dataclass(frozen=True, eq=False)
-class Averaging:
-    """An `UpdateRule` that moves theta as another does and remembers the mean of its theta.
+def averaged(learner: Learner, skip: int = 0) -> Learner:
+    """A learner that remembers the mean of its theta after `skip` steps, for `judged_theta`.
 
     Source: Polyak and Juditsky (1992).
     """
-
-    rule: UpdateRule
-    skip: int = 0  # steps before the mean begins
-
-    def init(self, weights: Weights) -> Mean:
-        """The mean of one theta."""
-        return Mean(weights.theta, 0, self.rule.init(weights))
-
-    def step(self, theta: Vector, memory: Mean, *given: Any) -> tuple[Vector, Mean]:
-        """mean <- mean + (theta - mean) / n; until n = 1, the mean is theta."""
-        theta, inner = self.rule.step(theta, memory.inner, *given)
-        steps = memory.steps + 1
-        part = 1 / max(steps - self.skip, 1)
-        return theta, Mean(memory.theta + part * (theta - memory.theta), steps, inner)
-
-    def interrupted(self, theta: Vector, memory: Mean) -> tuple[Vector, Mean]:
-        """As the rule."""
-        theta, inner = self.rule.interrupted(theta, memory.inner)
-        return theta, memory._replace(inner=inner)
+    rule = learner.bounded_rule
+    parts = (partial(_averaged, rule, skip), partial(_first_mean, rule), partial(_mean_of, rule))
+    return replace(learner, name=f"{learner.name} averaged", rule=UpdateRule(*parts))
 
 
-def averaged(learner: Learner, skip: int = 0) -> Learner:
-    """A learner that keeps the mean of its theta, which `judged_theta` returns."""
-    rule = Averaging(learner.bounded_rule, skip)
-    return replace(learner, name=f"{learner.name} averaged", rule=rule)
+def _first_mean(rule: UpdateRule, weights: Weights) -> Mean:
+    return Mean(weights.theta, 0, rule.init(weights))
+
+
+def _averaged(
+    rule: UpdateRule, skip: int, theta: Vector, memory: Mean, *given: Any
+) -> tuple[Vector, Mean]:
+    """mean <- mean + (theta - mean) / n; until n = 1, the mean is theta."""
+    theta, inner = rule.step(theta, memory.inner, *given)
+    steps = memory.steps + 1
+    part = 1 / max(steps - skip, 1)
+    return theta, Mean(memory.theta + part * (theta - memory.theta), steps, inner)
+
+
+def _mean_of(rule: UpdateRule, theta: Vector, memory: Mean) -> tuple[Vector, Mean]:
+    theta, inner = rule.interrupted(theta, memory.inner)
+    return theta, memory._replace(inner=inner)
 
 
 class Best(NamedTuple):
@@ -158,7 +152,7 @@ class Best(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Undoing:
-    """An `UpdateRule` that goes back to the best theta where a confirming rollout got worse.
+    """The functions of a rule that goes back to the best theta where a rollout costs more.
 
     It begins with a rollout of the first theta, and makes one after every `every` episodes, those
     that a failed solve ended among them. A rollout that fails costs infinitely much. After a step
@@ -200,7 +194,8 @@ class Undoing:
 
 def undo(learner: Learner, confirm: Callable[[Vector], float], every: int = 1) -> Learner:
     """A learner that takes back steps after which a rollout without noise costs more: `Undoing`."""
-    rule = Undoing(learner.bounded_rule, confirm, every)
+    own = Undoing(learner.bounded_rule, confirm, every)
+    rule = UpdateRule(own.step, own.init, own.interrupted)
     return replace(learner, name=f"{learner.name} undone", rule=rule)
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.trials import evaluations, final_costs, summarise
-from nmpcrl.learning import Learner, Rule, SecondSolve, evaluate, expected_sarsa, frozen
+from nmpcrl.learning import Learner, SecondSolve, UpdateRule, evaluate, expected_sarsa, frozen
 from nmpcrl.study import Trial, paper, run
 
 THETA = paper.THETA_INIT
@@ -40,7 +40,7 @@ def lost(nmpc, at):
         steps.append(1)
         return theta * (np.nan if len(steps) == at else 1), memory
 
-    return Learner("lost", SecondSolve(nmpc), Rule(step), nmpc.gamma)
+    return Learner("lost", SecondSolve(nmpc), UpdateRule(step), nmpc.gamma)
 
 
 @pytest.mark.parametrize("at", [1, STEPS])

@@ -1,11 +1,13 @@
-"""Controllers that need no solver: value, features and Hessian have a closed form."""
+"""Controllers and networks that need no solver: value, features and Hessian in closed form."""
 
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from nmpcrl.control import Ipopt, Nmpc, Parameter, Problem
 from nmpcrl.learning import Transition, Weights
 
 
@@ -31,16 +33,16 @@ class LinearController:
 
     def value_hessian_times(self, solution, vector):
         self.products.append((solution, vector))
-        return self.hessian(solution.state, solution.theta) @ vector
+        return self.value_hessian(solution) @ vector
+
+    def value_hessian(self, solution):
+        return np.zeros((3, 3))
 
     def value(self, state, theta):
         return float(state @ theta)
 
     def features(self, state, theta):
         return state
-
-    def hessian(self, state, theta):
-        return np.zeros((state.size, state.size))
 
 
 class QuadraticController(LinearController):
@@ -52,8 +54,8 @@ class QuadraticController(LinearController):
     def features(self, state, theta):
         return 2 * (state @ theta) * state
 
-    def hessian(self, state, theta):
-        return 2 * np.outer(state, state)
+    def value_hessian(self, solution):
+        return 2 * np.outer(solution.state, solution.state)
 
 
 @dataclass
@@ -122,3 +124,16 @@ def transition(controller):
         return Transition(state, np.array([-0.6, 1.0]), cost, after, solution)
 
     return build
+
+
+@pytest.fixture(scope="session")
+def tank() -> Nmpc:
+    """One state that is no position; the gain of the model is learned, within bounds, and wrong."""
+    problem = Problem(
+        states=1, inputs=1, horizon=5, gamma=0.9, lower=-1, upper=1,
+        theta={"gain": Parameter(0.5, 0.2, 0.6), "V0": Parameter(0.0, -10, 10)},
+        model=lambda x, u, th: 0.9 * x + th["gain"] * u,
+        stage=lambda x, u, th: ca.sumsqr(x - 1) + 0.1 * ca.sumsqr(u),
+        initial=lambda x, th: th["V0"],
+    )  # fmt: skip
+    return Nmpc(problem, solver=Ipopt())

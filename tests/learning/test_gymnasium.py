@@ -11,14 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from nmpcrl.control import Ipopt, Nmpc, Problem
-from nmpcrl.learning import (
-    Exploration,
-    Weights,
-    as_gymnasium,
-    evaluate,
-    expected_sarsa,
-    train,
-)
+from nmpcrl.learning import Exploration, Weights, as_gymnasium, evaluate, expected_sarsa, train
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -33,18 +26,12 @@ def robot() -> Nmpc:
 def car() -> Nmpc:
     """Gymnasium's MountainCarContinuous, planned with another hill."""
     problem = Problem(
-        states=2,
-        inputs=1,
-        horizon=10,
-        gamma=0.99,
-        theta={"hill": 0.002},
+        states=2, inputs=1, horizon=10, gamma=0.99, lower=-1, upper=1, theta={"hill": 0.002},
         model=lambda x, u, th: ca.vertcat(
             x[0] + x[1], x[1] + 0.0015 * u - th["hill"] * ca.cos(3 * x[0])
         ),
         stage=lambda x, u, th: ca.sumsqr(x[0] - 0.45) + 0.1 * ca.sumsqr(u),
-        lower=-1,
-        upper=1,
-    )
+    )  # fmt: skip
     return Nmpc(problem, solver=Ipopt())
 
 
@@ -68,14 +55,10 @@ class Slow(gymnasium.Env):
         return self.x, float(self.x[0]) - 2, bool(self.x[0] > 1), self.time == 6, {}
 
 
-def noise(episodes, steps, inputs=1, seed=0):
-    return Exploration.draw(np.random.default_rng(seed), (episodes, steps, inputs), deviation=0.1)
-
-
 def run(nmpc, theta, plant, rng=0, shape=(3, 10)):
-    weights = Weights(theta, np.zeros(theta.size))
-    explore = noise(*shape, nmpc.m)
-    return list(train(expected_sarsa(nmpc, 1e-7), nmpc, weights, explore, plant=plant, rng=rng))
+    explore = Exploration.draw(np.random.default_rng(0), (*shape, nmpc.m), deviation=0.1)
+    learner = expected_sarsa(nmpc, 1e-7)
+    return list(train(learner, nmpc, Weights(theta), explore, plant=plant, rng=rng))
 
 
 def test_a_gymnasium_environment_is_a_plant(car):

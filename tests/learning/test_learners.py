@@ -1,9 +1,13 @@
-"""learner = bootstrap x update rule: each pairing by hand, and where each one settles."""
+"""learner = bootstrap x update rule: steps by hand, the protocol, and where learning settles."""
 
+import copy
+import pickle
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 from nmpcrl.control import SolverError
 from nmpcrl.learning import (
@@ -11,166 +15,256 @@ from nmpcrl.learning import (
     Learner,
     SecondSolve,
     Transition,
+    UpdateRule,
     Weights,
     deep_expected_sarsa,
     expected_sarsa,
     frozen,
     gradient_expected_sarsa,
     gradient_tdc,
+    lstd_q,
+    policy_gradient,
     q_learning,
     random_direction,
     regularized_deep_expected_sarsa,
     step_matched,
 )
 from nmpcrl.learning.learners import gradient_td
+from nmpcrl.learning.remedies import averaged, guarded, normalised_ges, tdrc
 
 ALPHA, BETA = 0.1, 0.01
 THETA, W = np.array([1.0, 0.5, -1.0]), np.array([0.1, 0.0, 0.2])
+PHI, PHI_NEXT = np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.0, -1.0])  # of `transition`
+DELTA = 4.0 + 0.9 * 1.5 + 1.0
+OVERLAP = 0.1 + 0.6  # w'phi
+ES = THETA + ALPHA * DELTA * PHI
+GES = THETA + ALPHA * (DELTA * PHI - 0.9 * OVERLAP * PHI_NEXT)
+LENGTH = np.linalg.norm(GES - THETA)
+DEEP = THETA + ALPHA * (4.0 + 0.9 * 7.0 + 1.0) * PHI  # by the network's answer
+DEEP_MAKERS = (deep_expected_sarsa, regularized_deep_expected_sarsa)
+
+MAKERS = {
+    "ES": lambda c, _: expected_sarsa(c, ALPHA),
+    "DES": lambda c, n: deep_expected_sarsa(c, n, ALPHA),
+    "RDES": lambda c, n: regularized_deep_expected_sarsa(c, n, ALPHA),
+    "GES": lambda c, _: gradient_expected_sarsa(c, ALPHA, BETA),
+    "TDC": lambda c, _: gradient_tdc(c, ALPHA, BETA),
+    "QL": lambda c, _: q_learning(c, ALPHA),
+    "frozen": lambda c, _: frozen(c),
+    "matched": lambda c, _: step_matched(c, ALPHA, BETA),
+    "random": lambda c, _: random_direction(c, ALPHA, np.random.default_rng(0)),
+}
+SOLVING = ("ES", "GES", "TDC", "QL", "matched", "random")
+MOVED_W = W + BETA * (DELTA - OVERLAP) * PHI
 
 
-@pytest.fixture
-def weights() -> Weights:
-    return Weights(THETA.copy(), W.copy())
+def at_random(controller, seed=0):
+    return random_direction(controller, ALPHA, np.random.default_rng(seed))
 
 
-def learners(controller, network):
-    return {
-        "ES": expected_sarsa(controller, ALPHA),
-        "DES": deep_expected_sarsa(controller, network, ALPHA),
-        "RDES": regularized_deep_expected_sarsa(controller, network, ALPHA),
-        "GES": gradient_expected_sarsa(controller, ALPHA, BETA),
-        "TDC": gradient_tdc(controller, ALPHA, BETA),
-        "QL": q_learning(controller, ALPHA),
-        "frozen": frozen(controller),
-        "matched": step_matched(controller, ALPHA, BETA),
-        "random": random_direction(controller, ALPHA, np.random.default_rng(0)),
-    }
+def moved(learner, weights, transition):
+    """The step that a learner makes in theta."""
+    return learner.step(weights, transition).weights.theta - weights.theta
 
 
-NAMES = tuple(learners(SimpleNamespace(gamma=0.9), None))
-
-
-def test_the_table_of_pairings(controller, network):
-    table = learners(controller, network)
-    assert {name: learner.name for name, learner in table.items()} == {n: n for n in table}
-    for name in ("ES", "GES", "TDC", "QL", "matched", "random"):
-        assert isinstance(table[name].bootstrap, SecondSolve)
-    for name in ("DES", "RDES"):
-        assert isinstance(table[name].bootstrap, Imitation)
-    assert not table["DES"].bootstrap.with_theta
-    assert table["RDES"].bootstrap.with_theta
-    assert all(learner.gamma == controller.gamma for learner in table.values())
-
-
-def test_expected_sarsa_by_hand(controller, transition, weights):
-    update = expected_sarsa(controller, ALPHA).step(weights, transition(THETA))
-    delta = 4.0 + 0.9 * (0.5 + 1.0) - (1.0 + 1.0 - 3.0)
-    assert update.delta == pytest.approx(delta)
-    expected = THETA + ALPHA * delta * np.array([1.0, 2.0, 3.0])
-    np.testing.assert_allclose(update.weights.theta, expected)
-    np.testing.assert_array_equal(update.weights.w, W)
-    assert update.successor.value == 1.5
-
-
-def test_gradient_expected_sarsa_by_hand(controller, transition, weights):
-    update = gradient_expected_sarsa(controller, ALPHA, BETA).step(weights, transition(THETA))
-    delta = 4.0 + 0.9 * 1.5 + 1.0
-    phi, phi_next = np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.0, -1.0])
-    overlap = 0.1 + 0.6  # w'phi, with the old w
-    theta = THETA + ALPHA * (delta * phi - 0.9 * overlap * phi_next)
-    np.testing.assert_allclose(update.weights.theta, theta)
-    np.testing.assert_allclose(update.weights.w, W + BETA * (delta - overlap) * phi)
-
-
-@pytest.mark.parametrize("name", ["DES", "RDES"])
-def test_the_deep_learners_by_hand(controller, network, transition, weights, name):
+@pytest.mark.parametrize(
+    ("name", "theta", "w"),
+    [
+        ("ES", ES, W),
+        ("QL", ES, W),
+        ("DES", DEEP, W),
+        ("RDES", DEEP, W),
+        ("GES", GES, MOVED_W),
+        ("TDC", GES, MOVED_W),  # the value is linear
+        ("matched", THETA + LENGTH * (ES - THETA) / np.linalg.norm(ES - THETA), MOVED_W),
+        ("frozen", THETA, W),
+    ],
+)
+def test_a_step_by_hand(controller, network, transition, weights, name, theta, w):
+    """It is pure, too, and a learner goes on from a copy and a pickle of it and of its weights."""
     network.batch = 1
-    update = learners(controller, network)[name].step(weights, transition(THETA))
-    delta = 4.0 + 0.9 * 7.0 + 1.0
-    assert update.delta == pytest.approx(delta)
-    np.testing.assert_allclose(
-        update.weights.theta, THETA + ALPHA * delta * np.array([1.0, 2.0, 3.0])
+    learner, step = MAKERS[name](controller, network), transition(THETA)
+    assert (learner.name, learner.gamma) == (name, controller.gamma)
+    for one in (learner, learner, copy.deepcopy(learner), pickle.loads(pickle.dumps(learner))):
+        assert one.rule.moves == learner.rule.moves
+        update = one.step(weights, step)
+        np.testing.assert_allclose(update.weights.theta, theta)
+        np.testing.assert_allclose(update.weights.w, w)
+    np.testing.assert_array_equal(weights.theta, THETA)
+    np.testing.assert_array_equal(weights.w, W)
+    np.testing.assert_array_equal(step.solution.features, PHI)
+    again = pickle.loads(pickle.dumps(update.weights))
+    for one in (copy.deepcopy(update.weights), again, Weights(again.theta, again.w)):
+        np.testing.assert_array_equal(
+            learner.step(one, step).weights.theta, learner.step(update.weights, step).weights.theta
+        )
+    assert update.delta == pytest.approx(
+        {"frozen": None, "DES": 11.3, "RDES": 11.3}.get(name, DELTA)
     )
-    assert controller.calls == []  # not one solve more
+
+
+def test_weights_begin_with_w_zero_if_none_is_given(controller, transition):
+    step, learner = transition(THETA), gradient_expected_sarsa(controller, ALPHA, BETA)
+    bare, zero = (learner.step(w, step) for w in (Weights(THETA), Weights(THETA, np.zeros(3))))
+    np.testing.assert_allclose(bare.weights.theta, ES)  # whose w'phi is 0
+    np.testing.assert_array_equal(bare.weights.w, zero.weights.w)
+    assert bare.weights.w.any()
+    np.testing.assert_array_equal(Weights(THETA).w, np.zeros(3))
 
 
 @pytest.mark.parametrize("name", ["DES", "RDES"])
 def test_a_gated_learner_does_not_move_before_its_network_is_ready(
     controller, network, transition, weights, name
 ):
-    learner = learners(controller, network)[name]
+    learner = MAKERS[name](controller, network)
+    assert isinstance(learner.bootstrap, Imitation)
+    assert learner.bootstrap.with_theta == (name == "RDES")
     first, second, third = (learner.step(weights, transition(THETA)) for _ in range(3))
     assert first.weights is weights
     assert second.weights is weights
     assert (first.delta, first.successor) == (None, None)
     assert third.delta is not None
+    assert controller.calls == []
 
 
-@pytest.mark.parametrize("make", [deep_expected_sarsa, regularized_deep_expected_sarsa])
-def test_a_literal_learner_moves_from_the_first_step(
+@pytest.mark.parametrize("make", DEEP_MAKERS)
+def test_options_of_a_deep_learner_are_those_of_imitation(
     controller, network, transition, weights, make
 ):
-    update = make(controller, network, ALPHA, gated=False).step(weights, transition(THETA))
-    assert update.delta == pytest.approx(4.0 + 0.9 * 7.0 + 1.0)
-
-
-@pytest.mark.parametrize("make", [deep_expected_sarsa, regularized_deep_expected_sarsa])
-def test_a_deep_learner_fits_as_often_a_step_as_it_is_told(
-    controller, network, transition, weights, make
-):
+    literal = make(controller, network, ALPHA, gated=False).step(weights, transition(THETA))
+    np.testing.assert_allclose(literal.weights.theta, DEEP)
     network.batch = 1
     make(controller, network, ALPHA, fits=4).step(weights, transition(THETA))
     assert network.fits == 4
 
 
-@pytest.mark.parametrize("name", sorted({*NAMES} - {"random"}))  # it draws
-def test_a_step_is_pure(controller, network, transition, weights, name):
-    network.batch = 1
-    learner, step = learners(controller, network)[name], transition(THETA)
-    one, other = learner.step(weights, step), learner.step(weights, step)
-    np.testing.assert_array_equal(weights.theta, THETA)
-    np.testing.assert_array_equal(weights.w, W)
-    np.testing.assert_array_equal(step.solution.features, [1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(one.weights.theta, other.weights.theta)
-    np.testing.assert_array_equal(one.weights.w, other.weights.w)
+@pytest.mark.parametrize("name", SOLVING)
+def test_the_next_action_is_the_policys_own(controller, network, transition, weights, name):
+    """The next state is solved with u_0 free, even where the value learned has it fixed."""
+    step = transition(THETA)
+    MAKERS[name](controller, network).step(weights, step)
+    ((state, theta, _, action),) = controller.calls
+    assert (state is step.next_state, theta is weights.theta, action) == (True, True, None)
 
 
-def test_gradient_td_without_the_next_features_is_refused(controller, network, transition, weights):
+def test_frozen_asks_for_nothing(controller, transition, weights):
+    assert frozen(controller).step(weights, transition(THETA, cost=1e9)).weights is weights
+    assert controller.calls == []
+
+
+def test_what_is_no_rule_and_a_bootstrap_that_does_not_fit_are_refused(
+    controller, network, transition, weights
+):
+    with pytest.raises(ValueError, match=r"must be an UpdateRule: write UpdateRule\(step\)"):
+        Learner("old", SecondSolve(controller), lambda weights, *_: weights, 0.9)
     network.batch = 1
-    mismatched = Learner(
-        "GES by network", Imitation(network, with_theta=True), gradient_td(ALPHA, BETA, 0.9), 0.9
-    )
+    bootstrap = Imitation(network, with_theta=True)
+    mismatched = Learner("GES by network", bootstrap, gradient_td(ALPHA, BETA, 0.9), 0.9)
     with pytest.raises(ValueError, match="needs the next state's features: bootstrap by SecondS"):
         mismatched.step(weights, transition(THETA))
 
 
-def test_a_failed_second_solve_is_the_callers_to_judge(controller, transition, weights):
-    step = transition(THETA)
+def test_a_failed_second_solve_is_the_callers_to_judge(transition, weights):
+    def fail(state, theta, _):
+        raise SolverError("no optimum", state, theta)
 
-    def fail(*_):
-        raise SolverError("no optimum", step.next_state, THETA)
-
-    broken = SimpleNamespace(gamma=0.9, solve=fail)
     with pytest.raises(SolverError):
-        expected_sarsa(broken, ALPHA).step(weights, step)
+        expected_sarsa(SimpleNamespace(gamma=0.9, solve=fail), ALPHA).step(
+            weights, transition(THETA)
+        )
 
 
-@pytest.mark.parametrize("name", ["ES", "GES", "TDC", "QL", "matched", "random"])
-def test_the_next_action_is_the_policys_own(controller, network, transition, weights, name):
-    """The next state is solved with u_0 free, even where the value learned has it fixed."""
+@pytest.mark.parametrize(
+    "make",
+    [lambda c: expected_sarsa(c, ALPHA), lambda c: gradient_expected_sarsa(c, ALPHA, BETA), lstd_q],
+)
+def test_nothing_is_learned_from_an_episode_that_failed(controller, transition, weights, make):
+    learner = make(controller)
+    moved = learner.step(weights, transition(THETA)).weights
+    for before in (weights, moved):
+        after = learner.interrupted(before)
+        np.testing.assert_array_equal(after.theta, before.theta)
+        np.testing.assert_array_equal(after.w, before.w)
+
+
+def test_a_rule_of_ones_own_has_a_memory_and_is_told_of_an_episode_that_failed(
+    controller, transition, weights
+):
+    """Momentum that forgets its velocity; theta stays within the learner's bounds."""
+
+    def step(theta, velocity, transition, delta, successor):
+        velocity = 0.5 * velocity + ALPHA * delta * transition.solution.features
+        return theta + velocity, velocity
+
+    rule = UpdateRule(
+        step, lambda weights: 0 * weights.theta, lambda theta, velocity: (theta, 0 * velocity)
+    )
+    learner, one = Learner("own", SecondSolve(controller), rule, 0.9), transition(THETA)
+    first = learner.step(weights, one).weights
+    np.testing.assert_allclose(first.theta, ES)
+    np.testing.assert_allclose(
+        moved(learner, first, one),
+        0.5 * (ES - THETA) + ALPHA * learner.step(first, one).delta * PHI,
+    )
+    np.testing.assert_array_equal(learner.interrupted(first).memory, np.zeros(3))
+    np.testing.assert_array_equal(first.w, W)
+    bounded = replace(learner, bounds=(np.full(3, -1.5), np.ones(3)))
+    np.testing.assert_array_equal(bounded.step(weights, one).weights.theta, np.clip(ES, -1.5, 1.0))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda c: lstd_q(c, curvature=True),
+        lambda c: averaged(gradient_expected_sarsa(c, ALPHA, BETA)),
+        lambda c: guarded(tdrc(c, ALPHA), ALPHA),
+        lambda c: normalised_ges(c, ALPHA),
+        policy_gradient,
+    ],
+)
+def test_learners_can_be_pickled(controller, make):
+    again = pickle.loads(pickle.dumps(make(controller)))
+    assert again.name == make(controller).name
+
+
+@pytest.mark.parametrize("cost", [4.0, -9.0])
+def test_matched_goes_where_es_goes_and_stays_where_that_has_no_direction(
+    controller, transition, weights, cost
+):
+    step, es = transition(THETA, cost=cost), expected_sarsa(controller, ALPHA)
+    matched = moved(step_matched(controller, ALPHA, BETA), weights, step)
+    length = np.linalg.norm(moved(gradient_expected_sarsa(controller, ALPHA, BETA), weights, step))
+    there = moved(es, weights, step)
+    np.testing.assert_allclose(matched, length * there / np.linalg.norm(there))
+    still, nowhere = Weights(np.zeros(3), W), transition(np.zeros(3), cost=0.0)  # every value is 0
+    assert moved(gradient_expected_sarsa(controller, ALPHA, BETA), still, nowhere).any()
+    assert not moved(step_matched(controller, ALPHA, BETA), still, nowhere).any()
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1), (1, -1, 0)])
+def test_random_steps_are_as_long_as_those_of_es_and_favour_no_direction(
+    controller, transition, weights, axis
+):
+    """Archimedes: on a sphere, the component along any axis is uniform between -1 and 1."""
+    step, learner = transition(THETA), at_random(controller)
+    steps = np.array([moved(learner, weights, step) for _ in range(4000)])
+    lengths = np.linalg.norm(steps, axis=1, keepdims=True)
+    np.testing.assert_allclose(lengths, np.linalg.norm(ES - THETA))
+    along = steps / lengths @ axis / np.linalg.norm(axis)
+    assert kstest(along, "uniform", args=(-1, 2)).pvalue > 1e-3
+
+
+def test_random_directions_come_from_the_given_generator_alone(controller, transition, weights):
     step = transition(THETA)
-    learners(controller, network)[name].step(weights, step)
-    ((state, theta, _, action),) = controller.calls
-    assert state is step.next_state
-    assert theta is weights.theta
-    assert action is None
 
+    def path(learner):
+        return [moved(learner, weights, step).tolist() for _ in range(3)]
 
-def test_from_the_same_solution_q_learning_moves_as_es_does(controller, transition, weights):
-    step = transition(THETA)
-    es, ql = (make(controller, ALPHA).step(weights, step) for make in (expected_sarsa, q_learning))
-    np.testing.assert_array_equal(ql.weights.theta, es.weights.theta)
-    np.testing.assert_array_equal(ql.weights.w, W)
+    learner = at_random(controller, 5)
+    first = path(copy.deepcopy(learner))
+    assert path(learner) == first == path(at_random(controller, 5))
+    assert path(at_random(controller, 6)) != first
+    assert first[0] != first[1]
 
 
 class Bandit:
@@ -187,8 +281,8 @@ class Bandit:
 def test_q_learning_finds_the_value_of_every_action_from_random_ones():
     """Whatever is done, the best is done next: Q(a) = c(a) + gamma min c / (1 - gamma)."""
     bandit, rng = Bandit(), np.random.default_rng(0)
-    learner = q_learning(bandit, 0.1)
-    weights = Weights(np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    learner, weights = q_learning(bandit, 0.1), Weights(np.array([0.0, 0.0, 1.0]))
+    assert learner.values_actions
     for a in rng.uniform(-1, 1, 5000):
         solution = bandit.solve(None, weights.theta, action=a)
         cost = 3 + 2 * (a - 0.5) ** 2
@@ -196,26 +290,22 @@ def test_q_learning_finds_the_value_of_every_action_from_random_ones():
     np.testing.assert_allclose(weights.theta, [3.5 + 27, -2, 2], rtol=1e-6)
 
 
-def ring(controller, learner, steps):
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda c: expected_sarsa(c, 0.5),
+        lambda c: gradient_expected_sarsa(c, 0.4, 0.4),
+        lambda c: gradient_tdc(c, 0.4, 0.4, projection=(0.0, 100.0)),
+    ],
+)
+def test_learning_settles_at_the_bellman_equations_solution(controller, make):
     """Three states in a ring with costs 1, 2, 3; the features tell them apart, so V is exact."""
-    states, costs = np.eye(3), (1.0, 2.0, 3.0)
-    weights = Weights(np.zeros(3), np.zeros(3))
-    for k in range(steps):
+    states, costs, weights, learner = np.eye(3), (1.0, 2.0, 3.0), Weights(0 * W), make(controller)
+    for k in range(9000):
         state, after = states[k % 3], states[(k + 1) % 3]
         solution = controller.solve(state, weights.theta)
         step = Transition(state, np.zeros(2), costs[k % 3], after, solution)
         weights = learner.step(weights, step).weights
-    return weights
-
-
-@pytest.mark.parametrize("name", ["ES", "GES", "TDC"])
-def test_learning_settles_at_the_bellman_equations_solution(controller, network, name):
-    learner = {
-        "ES": expected_sarsa(controller, 0.5),
-        "GES": gradient_expected_sarsa(controller, 0.4, 0.4),
-        "TDC": gradient_tdc(controller, 0.4, 0.4, projection=(0.0, 100.0)),
-    }[name]
-    exact = np.linalg.solve(np.eye(3) - 0.9 * np.roll(np.eye(3), 1, axis=1), [1.0, 2.0, 3.0])
-    weights = ring(controller, learner, 9000)
+    exact = np.linalg.solve(np.eye(3) - 0.9 * np.roll(np.eye(3), 1, axis=1), costs)
     np.testing.assert_allclose(weights.theta, exact, rtol=1e-3)
     np.testing.assert_allclose(weights.w, 0, atol=1e-2)  # no TD error is left to track

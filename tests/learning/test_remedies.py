@@ -36,7 +36,8 @@ from nmpcrl.learning.remedies import (
 from nmpcrl.study import paper
 
 CHAIN, ALPHA = Chain(gamma=0.97), 0.1
-THETA = np.array(paper.THETA_INIT)
+COSTS = (1.0, -2.0, 4.0, 0.5)
+LEARNERS = [expected_sarsa, lambda c, alpha: gradient_expected_sarsa(c, alpha, 0.2)]
 
 
 def in_turn(learner, weights, transitions):
@@ -48,32 +49,25 @@ def in_turn(learner, weights, transitions):
     return path
 
 
-def test_the_expected_step_of_tdrc_on_the_chain_is_that_of_ghiassian_et_al(controller):
+@pytest.fixture
+def ends(transition, weights):
+    """Transitions that end an episode each."""
+    return [replace(transition(weights.theta, cost=cost), last=True) for cost in COSTS]
+
+
+def test_tdrc_on_the_chain_is_that_of_ghiassian_et_al(controller):
+    """It converges where a semi-gradient diverges, if it is not regularised too much."""
     controller.gamma, decay, up = CHAIN.gamma, 0.5, 2 * CHAIN.gamma - 1
-    rule = tdrc(controller, ALPHA, decay).rule
     by_hand = [
         [1 + ALPHA * up, -2 * ALPHA * CHAIN.gamma],
         [ALPHA * up, 1 - ALPHA * (1 + decay)],
     ]
+    rule = tdrc(controller, ALPHA, decay).rule
     np.testing.assert_allclose(expected_matrix(CHAIN, rule), by_hand)
-
-
-def test_tdrc_converges_where_a_semi_gradient_diverges_if_it_is_not_regularised_too_much(
-    controller,
-):
-    controller.gamma = CHAIN.gamma
-    edge, alpha = 2 * CHAIN.gamma - 1, 0.01  # of the regularisation, for small steps
+    alpha = 0.01  # the edge of the regularisation is that of small steps
     assert spectral_radius(CHAIN, semi_gradient(alpha)) > 1
-    assert spectral_radius(CHAIN, tdrc(controller, alpha, edge - 0.1).rule) < 1
-    assert spectral_radius(CHAIN, tdrc(controller, alpha, edge + 0.01).rule) > 1
-
-
-def test_tdrc_without_its_decay_is_gradient_td_with_one_step_size(controller, transition, weights):
-    one = transition(weights.theta)
-    found = tdrc(controller, ALPHA, 0.0).step(weights, one).weights
-    wanted = gradient_expected_sarsa(controller, ALPHA, ALPHA).step(weights, one).weights
-    np.testing.assert_allclose(found.theta, wanted.theta)
-    np.testing.assert_allclose(found.w, wanted.w)
+    assert spectral_radius(CHAIN, tdrc(controller, alpha, up - 0.1).rule) < 1
+    assert spectral_radius(CHAIN, tdrc(controller, alpha, up + 0.01).rule) > 1
 
 
 def test_a_normalised_step_of_w_meets_its_error_however_large_beta_is(controller):
@@ -86,45 +80,45 @@ def test_a_normalised_step_of_w_meets_its_error_however_large_beta_is(controller
         assert error[1] == pytest.approx(left * error[0], abs=1e-6)
 
 
-def test_ges_with_a_small_beta_is_the_normalised_one_to_first_order(
-    controller, transition, weights
+@pytest.mark.parametrize(
+    ("make", "alpha", "beta"),
+    [
+        (lambda c: tdrc(c, ALPHA, 0.0), ALPHA, ALPHA),
+        (lambda c: normalised_ges(c, 1e-9), 1e-9, 3e-9),
+    ],
+)
+def test_ges_is_tdrc_without_decay_and_the_normalised_one_with_a_small_beta(
+    controller, transition, weights, make, alpha, beta
 ):
-    one, alpha = transition(weights.theta), 1e-9
-    found = normalised_ges(controller, alpha).step(weights, one).weights
-    wanted = gradient_expected_sarsa(controller, alpha, 3 * alpha).step(weights, one).weights
+    one = transition(weights.theta)
+    found = make(controller).step(weights, one).weights
+    wanted = gradient_expected_sarsa(controller, alpha, beta).step(weights, one).weights
     np.testing.assert_allclose(found.theta, wanted.theta, rtol=1e-12)
     np.testing.assert_allclose(found.w - weights.w, wanted.w - weights.w, rtol=1e-6)
 
 
-@pytest.mark.parametrize("make", [expected_sarsa, lambda c, a: gradient_expected_sarsa(c, a, 0.2)])
-def test_a_guard_that_does_not_bind_leaves_every_bit(controller, transition, weights, make):
-    one, alpha = transition(weights.theta), 1 / 14  # ||phi||^2 = 14
-    base = make(controller, alpha)
-    found, wanted = guarded(base, alpha).step(weights, one), base.step(weights, one)
-    np.testing.assert_array_equal(found.weights.theta, wanted.weights.theta)
-    np.testing.assert_array_equal(found.weights.w, wanted.weights.w)
-
-
-@pytest.mark.parametrize("make", [expected_sarsa, lambda c, a: gradient_expected_sarsa(c, a, 0.2)])
-def test_a_guard_that_binds_is_the_learner_with_the_smaller_alpha(
+@pytest.mark.parametrize("make", LEARNERS)
+def test_a_guard_takes_the_largest_alpha_that_does_not_pass_the_target(
     controller, transition, weights, make
 ):
-    one = transition(weights.theta)
-    found = guarded(make(controller, 5.0), 5.0).step(weights, one).weights
-    wanted = make(controller, 1 / 14).step(weights, one).weights
-    np.testing.assert_allclose(found.theta, wanted.theta)
-    np.testing.assert_allclose(found.w, wanted.w)
+    """1 / 14, since ||phi||^2 = 14; every bit is left where it does not bind."""
+    one, most = transition(weights.theta), 1 / 14
+    wanted = make(controller, most).step(weights, one).weights
+    for alpha, compare in (
+        (most, np.testing.assert_array_equal),
+        (5.0, np.testing.assert_allclose),
+    ):
+        found = guarded(make(controller, alpha), alpha).step(weights, one).weights
+        compare(found.theta, wanted.theta)
+        compare(found.w, wanted.w)
+    assert guard(0.5, np.zeros(3)) == 0.5
 
 
 def test_a_guarded_semi_gradient_never_passes_its_target(controller):
-    weights, alpha = Weights(np.ones(1), np.zeros(1)), 100.0
+    weights, alpha = Weights(np.ones(1)), 100.0
     rule = guarded(expected_sarsa(controller, alpha), alpha).rule
     moved = sampled_step(CHAIN, rule, weights, SECOND)  # whose next state is worth 0
     assert CHAIN.delta(moved.theta, SECOND) == pytest.approx(0, abs=1e-12)
-
-
-def test_a_guard_allows_any_step_where_there_is_no_feature():
-    assert guard(0.5, np.zeros(3)) == 0.5
 
 
 def test_the_control_goes_as_far_as_the_remedy_in_the_direction_of_es(
@@ -136,6 +130,7 @@ def test_the_control_goes_as_far_as_the_remedy_in_the_direction_of_es(
     found = directed(remedy, alpha).step(weights, one)
     step = found.weights.theta - weights.theta
     assert np.linalg.norm(step) == pytest.approx(np.linalg.norm(moved.theta - weights.theta))
+    np.testing.assert_array_equal(found.weights.w, moved.w)
     phi = one.solution.features
     np.testing.assert_allclose(
         step / np.linalg.norm(step), np.sign(found.delta) * phi / np.linalg.norm(phi)
@@ -143,18 +138,16 @@ def test_the_control_goes_as_far_as_the_remedy_in_the_direction_of_es(
 
 
 @pytest.mark.parametrize("wrap", [guarded, directed])
-def test_what_needs_a_step_size_refuses_a_batch(controller, wrap):
-    with pytest.raises(ValueError, match="needs a rule that moves theta at every step; LSTD-Q has"):
-        wrap(lstd_q(controller), 0.1)
+@pytest.mark.parametrize("make", [lstd_q, lambda c: averaged(expected_sarsa(c, 0.1))])
+def test_what_needs_a_step_size_refuses_a_memory(controller, wrap, make):
+    with pytest.raises(ValueError, match=r"a rule that moves theta at every step; .* has a memory"):
+        wrap(make(controller), 0.1)
 
 
 @pytest.mark.parametrize("skip", [0, 2])
-def test_an_average_is_the_mean_of_the_thetas_that_are_counted(
-    controller, transition, weights, skip
-):
+def test_an_average_is_the_mean_of_the_thetas_that_are_counted(controller, ends, weights, skip):
     base = expected_sarsa(controller, 0.01)
-    given = [transition(weights.theta, cost=cost) for cost in (1.0, -2.0, 4.0, 0.5)]
-    path, found = in_turn(base, weights, given), in_turn(averaged(base, skip), weights, given)
+    path, found = in_turn(base, weights, ends), in_turn(averaged(base, skip), weights, ends)
     thetas = [one.theta for one in path]
     np.testing.assert_array_equal([one.theta for one in found], thetas)
     np.testing.assert_allclose(judged_theta(found[-1]), np.mean(thetas[skip:], axis=0))
@@ -162,7 +155,7 @@ def test_an_average_is_the_mean_of_the_thetas_that_are_counted(
 
 
 class Judge:
-    """Says costs in turn, and notes what it was asked."""
+    """Says costs in turn, and notes the thetas."""
 
     def __init__(self, *costs):
         self.costs, self.asked = list(costs), []
@@ -172,13 +165,11 @@ class Judge:
         return self.costs.pop(0)
 
 
-def test_undo_goes_back_to_the_best_theta_and_w(controller, transition, weights):
+def test_undo_goes_back_to_the_best_theta_and_w(controller, ends, weights):
     judge = Judge(10.0, 8.0, np.inf, 9.0, 7.0)
     learner = undo(gradient_expected_sarsa(controller, 0.01, 0.02), judge)
-    ends = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0, 4.0, 0.5)]
     first, second, third, fourth = in_turn(learner, weights, ends)
-    assert len(judge.asked) == 5
-    assert not judge.costs
+    assert (len(judge.asked), judge.costs) == (5, [])
     np.testing.assert_array_equal(judge.asked[0], weights.theta)
     for back in (second, third):  # a failed rollout, and one that is worse than the best
         np.testing.assert_array_equal(back.theta, first.theta)
@@ -195,32 +186,18 @@ def test_undo_confirms_only_where_its_episodes_are_over(controller, transition, 
     assert len(judge.asked) == 3
 
 
-def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition, weights):
+@pytest.mark.parametrize("wrap", [lambda one: one, averaged])
+def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition, weights, wrap):
     """Whether it had a step or none, and under an average, too."""
-    for wrap in (lambda one: one, averaged):
-        judge = Judge(10.0, np.inf, 9.0, 8.0)
-        learner = wrap(undo(expected_sarsa(controller, 0.01), judge))
-        moved = learner.step(weights, transition(weights.theta)).weights
-        back = learner.interrupted(moved)
-        np.testing.assert_array_equal(back.theta, weights.theta)
-        kept = learner.interrupted(learner.step(back, transition(weights.theta)).weights)
-        assert not np.array_equal(kept.theta, weights.theta)
-        np.testing.assert_array_equal(learner.interrupted(kept).theta, kept.theta)
-        np.testing.assert_array_equal(
-            judge.asked, [weights.theta, moved.theta, kept.theta, kept.theta]
-        )
-
-
-@pytest.mark.parametrize("make", [expected_sarsa, lambda c, _: lstd_q(c)])
-def test_other_rules_learn_nothing_from_an_episode_that_failed(
-    controller, transition, weights, make
-):
-    learner = make(controller, 0.01)
+    judge = Judge(10.0, np.inf, 9.0, 8.0)
+    learner = wrap(undo(expected_sarsa(controller, 0.01), judge))
     moved = learner.step(weights, transition(weights.theta)).weights
-    for before in (weights, moved):
-        after = learner.interrupted(before)
-        np.testing.assert_array_equal(after.theta, before.theta)
-        np.testing.assert_array_equal(after.w, before.w)
+    back = learner.interrupted(moved)
+    np.testing.assert_array_equal(back.theta, weights.theta)
+    kept = learner.interrupted(learner.step(back, transition(weights.theta)).weights)
+    assert not np.array_equal(kept.theta, weights.theta)
+    np.testing.assert_array_equal(learner.interrupted(kept).theta, kept.theta)
+    np.testing.assert_array_equal(judge.asked, [weights.theta, moved.theta, kept.theta, kept.theta])
 
 
 def test_what_is_undone_or_averaged_stays_within_the_bounds(controller, transition, weights):
@@ -234,28 +211,20 @@ def test_what_is_undone_or_averaged_stays_within_the_bounds(controller, transiti
     np.testing.assert_array_equal(judge.asked[-1], found.theta)
 
 
-def test_undo_that_never_has_to_is_the_learner(controller, transition, weights):
-    base = expected_sarsa(controller, 0.01)
-    given = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0, 4.0)]
-    found = in_turn(undo(base, lambda theta: 0.0), weights, given)
-    wanted = in_turn(base, weights, given)
-    np.testing.assert_array_equal(found[-1].theta, wanted[-1].theta)
-
-
-def test_a_batch_can_be_undone_and_averaged(controller, transition, weights):
-    given = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0)]
-    base = lstd_q(controller)
-    plain = in_turn(base, weights, given)[-1].theta
+@pytest.mark.parametrize("make", [lambda c: expected_sarsa(c, 0.01), lstd_q])
+def test_undo_that_never_has_to_and_an_average_are_the_learner(controller, ends, weights, make):
+    base = make(controller)
+    wanted = in_turn(base, weights, ends)[-1].theta
     for learner in (undo(base, lambda theta: 0.0), averaged(base)):
-        np.testing.assert_array_equal(in_turn(learner, weights, given)[-1].theta, plain)
+        np.testing.assert_array_equal(in_turn(learner, weights, ends)[-1].theta, wanted)
 
 
 @pytest.mark.parametrize("make", [tdrc, normalised_ges])
 def test_a_remedy_learns_on_the_robot(make):
-    nmpc = paper.nmpc()
+    nmpc, theta = paper.nmpc(), np.array(paper.THETA_INIT)
     learner = guarded(make(nmpc, paper.ALPHA), paper.ALPHA)
     noise = Exploration.draw(np.random.default_rng(0), (1, 20, 2))
-    steps = list(train(learner, nmpc, Weights(THETA, np.full(9, paper.W_INIT)), noise))
+    steps = list(train(learner, nmpc, Weights(theta, np.full(9, paper.W_INIT)), noise))
     assert len(steps) == 20
-    assert not np.array_equal(steps[-1].weights.theta, THETA)
+    assert not np.array_equal(steps[-1].weights.theta, theta)
     assert np.isfinite(steps[-1].weights.w).all()

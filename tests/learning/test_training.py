@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
-from nmpcrl.learning import Rule, Weights, expected_sarsa, frozen, q_learning
+from nmpcrl.learning import UpdateRule, Weights, expected_sarsa, frozen, q_learning
 from nmpcrl.learning.learners import Auxiliary, first_w
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import (
@@ -166,7 +166,7 @@ def test_weights_may_be_lists_and_are_left_as_they_are(sound):
         return theta, memory
 
     given = Weights(THETA.tolist(), [0.0] * 9)
-    learner = dataclasses.replace(es(sound), rule=Rule(in_place))
+    learner = dataclasses.replace(es(sound), rule=UpdateRule(in_place))
     *_, last = train(learner, sound, given, noisy(1, 3))
     np.testing.assert_array_equal(last.weights.theta, THETA + 3)
     assert given.theta == THETA.tolist()
@@ -269,19 +269,14 @@ def test_a_second_solve_that_fails_ends_the_episode_and_keeps_theta():
 def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing):
     told = []
 
-    class Told:
-        def init(self, weights):
-            return None
+    def step(theta, memory, transition, delta, successor):
+        told.append(transition.first)
+        return theta, memory
 
-        def step(self, theta, memory, transition, delta, successor):
-            told.append(transition.first)
-            return theta, memory
-
-        def interrupted(self, theta, memory):
-            return 1.01 * theta, memory
+    rule = UpdateRule(step, interrupted=lambda theta, memory: (1.01 * theta, memory))
 
     controller = Faulty(lambda call: call == failing)
-    steps = training(controller, quiet(2, 3), lambda c: dataclasses.replace(es(c), rule=Told()))
+    steps = training(controller, quiet(2, 3), lambda c: dataclasses.replace(es(c), rule=rule))
     assert told == [True, True, False, False]
     failed = next(k for k, step in enumerate(steps) if step.failure)
     for step in steps[failed:]:
@@ -313,7 +308,7 @@ def leap(spoil):
         count += 1
         return spoil(theta, memory) if count == 3 else (theta, memory)
 
-    return lambda controller: dataclasses.replace(es(controller), rule=Rule(step, first_w))
+    return lambda controller: dataclasses.replace(es(controller), rule=UpdateRule(step, first_w))
 
 
 @pytest.mark.parametrize("absurd", [np.nan, np.inf, -1e7])
