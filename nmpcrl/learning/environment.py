@@ -9,7 +9,7 @@ Functions of the user are given copies, and what they return is copied, as numbe
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -22,25 +22,11 @@ from nmpcrl.control.solution import short
 # next state, cost l(s, a), whether the episode ends there, and whether only its time does
 Step = tuple[Vector, float, bool, bool]
 StepFunction = Callable[[Vector, Vector, np.random.Generator], tuple[Any, ...]]
+GymnasiumEnv = Any  # a `gymnasium.Env`, which need not be installed
 # of a `Problem`: a function of the time, or by name an array over the times of an episode
 Data = Callable[[int], Mapping[str, Any]] | Mapping[str, Any]
 Start = Vector | Callable[[np.random.Generator], Vector]
-
-
 PLANT = "plant is called as plant(state, action, rng) and returns (next state, cost, end)"
-
-
-class GymnasiumEnv(Protocol):
-    """What is asked of a `gymnasium.Env`."""
-
-    action_space: Any
-    observation_space: Any
-
-    def reset(self, *, seed: int | None = None) -> tuple[Any, Any]:
-        """An observation, and more."""
-
-    def step(self, action: Any) -> tuple[Any, Any, Any, Any, Any]:
-        """Observation, reward, terminated, truncated, and more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +60,7 @@ def environment(
             plan; or a `gymnasium.Env` is given a start.
     """
     if is_gymnasium(plant):
-        return of_gymnasium(cast(GymnasiumEnv, plant), nmpc, start)
+        return of_gymnasium(plant, nmpc, start)
     states, task = (nmpc.n, nmpc.task) if nmpc else (None, None)
     if nmpc and task:
         start = task.start if start is None else start

@@ -111,13 +111,6 @@ def first_w(weights: Weights) -> Auxiliary:
     return Auxiliary(weights.w)
 
 
-def auxiliary_weights(memory: Any) -> Vector | None:
-    """w of gradient TD, in a memory or in its `inner` one; None without gradient TD."""
-    while memory is not None and not isinstance(memory, Auxiliary):
-        memory = getattr(memory, "inner", None)
-    return memory and memory.w
-
-
 def projected(rule: UpdateRule, bounds: tuple[Any, Any]) -> UpdateRule:
     """A rule whose theta is projected into bounds, (least, most), after each step."""
     return UpdateRule(partial(_projected, rule, bounds), rule.init, rule.interrupted)
@@ -184,9 +177,11 @@ class Learner:
 
 
 def weights_after(before: Weights, theta: Vector, memory: Any) -> Weights:
-    """Weights whose w is that of the memory, or the one before where no rule moves it."""
-    w = auxiliary_weights(memory)
-    return Weights(theta, before.w if w is None else w, memory)
+    """Weights with the w that is in the memory or in its `inner` one; without any, the w before."""
+    found = memory
+    while found is not None and not isinstance(found, Auxiliary):
+        found = getattr(found, "inner", None)
+    return Weights(theta, before.w if found is None else found.w, memory)
 
 
 def theta_bounds(nmpc: Any) -> Bounds | None:
