@@ -8,7 +8,7 @@ from .model import NU
 from .solve import solve
 
 WARM_LIMIT = 40  # iterations from a warm start
-COLD_LIMIT = 200  # iterations from a cold one
+COLD_LIMIT = 300  # iterations from a cold one
 CLEARLY = 1e-6  # a plan is better if its value is less by this share
 LEAVES = 1e-6  # and if it violates hard rows by less than this
 

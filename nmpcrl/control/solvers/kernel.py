@@ -193,9 +193,9 @@ class Step(NamedTuple):
     lam: np.ndarray  # (rows of all stages,)
     below: np.ndarray
     above: np.ndarray
-    V: np.ndarray  # of the cost to go, (NX, NX)
-    v: np.ndarray  # (NX,)
-    w: np.ndarray  # (NX,)
+    p: np.ndarray  # costates, (N + 1, NX)
+    V: np.ndarray  # Hessian and gradient of the cost to go, (N + 1, NX, NX)
+    v: np.ndarray  # (N + 1, NX)
     VA: np.ndarray  # (NX, NX)
     VB: np.ndarray  # (NX, NU)
     L: np.ndarray  # (NU, NU)
@@ -277,8 +277,11 @@ def barrier(task, point, mu):
 
 
 @inlined
-def linearise(task, point, duals, stages):
-    """Step 2: derivatives of every stage, from the last to the first."""
+def linearise(task, point, duals, stages, costates):
+    """Step 2: derivatives of every stage, from the last to the first.
+
+    The Hessian is that of the Lagrangian with these costates, which may be `stages.p`.
+    """
     x, u, p, last = point.x, point.u, stages.p, len(point.u)
     for t in range(task.begin * task.rows, len(point.h)):
         stages.held[t] = duals.lam[t] if task.planned[t] > 0.0 else 0.0
@@ -293,7 +296,7 @@ def linearise(task, point, duals, stages):
         stages.px[0, a] = 0.0  # x_0 is given
     for i in range(last - 1, -1, -1):
         expand_stage(
-            x[i], u[i], task.theta, task.data[i], task.rate[i:], p[i + 1],
+            x[i], u[i], task.theta, task.data[i], task.rate[i:], costates[i + 1],
             stages.A[i], stages.B[i], stages.lx[i], stages.lu[i],
             stages.Q[i], stages.S[i], stages.R[i],
         )  # fmt: skip
@@ -434,25 +437,25 @@ def factorise(stages, delta, first, step):
     """Step 5: the Riccati recursion; false where Q_uu + delta I is not positive definite."""
     A, B, r, S, R = stages.A, stages.B, stages.r, stages.S, stages.R
     last = len(A)
-    V, v, w, VA, VB, L, F, f = step.V, step.v, step.w, step.VA, step.VB, step.L, step.F, step.f
+    V, v, VA, VB, L, F, f = step.V, step.v, step.VA, step.VB, step.L, step.F, step.f
     for a in range(NX):
-        v[a] = stages.q[last, a]
+        v[last, a] = stages.q[last, a]
         for b in range(NX):
-            V[a, b] = stages.Q[last, a, b]
+            V[last, a, b] = stages.Q[last, a, b]
     for i in range(last - 1, first - 1, -1):
         for a in range(NX):
             for b in range(NX):
                 VA[a, b] = 0.0
                 for c in range(NX):
-                    VA[a, b] += V[a, c] * A[i, c, b]
+                    VA[a, b] += V[i + 1, a, c] * A[i, c, b]
             for b in range(NU):
                 VB[a, b] = 0.0
                 for c in range(NX):
-                    VB[a, b] += V[a, c] * B[i, c, b]
+                    VB[a, b] += V[i + 1, a, c] * B[i, c, b]
         for a in range(NU):
             f[a] = r[i, a]
             for c in range(NX):
-                f[a] += B[i, c, a] * v[c]
+                f[a] += B[i, c, a] * v[i + 1, c]
             for b in range(NX):
                 F[a, b] = S[i, a, b]
                 for c in range(NX):
@@ -468,21 +471,20 @@ def factorise(stages, delta, first, step):
         if i == 0:
             break
         for a in range(NX):
-            w[a] = stages.q[i, a]
+            total = stages.q[i, a]
             for c in range(NX):
-                w[a] += A[i, c, a] * v[c]
+                total += A[i, c, a] * v[i + 1, c]
             for c in range(NU):
-                w[a] += F[c, a] * step.k[i, c]
+                total += F[c, a] * step.k[i, c]
+            v[i, a] = total
             for b in range(a + 1):
                 total = stages.Q[i, a, b]
                 for c in range(NX):
                     total += A[i, c, a] * VA[c, b]
                 for c in range(NU):
                     total += F[c, a] * step.K[i, c, b]
-                V[a, b] = total
-                V[b, a] = total
-        for a in range(NX):
-            v[a] = w[a]
+                V[i, a, b] = total
+                V[i, b, a] = total
     return True
 
 
@@ -743,9 +745,23 @@ def search(task, point, trial, mu, step, length, total, derivative):
         follow(task, point, step, length, WITHIN, trial)
         objective, reached = measure(task, trial, mu)
         if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
-            return objective, reached
+            return objective, reached, length
         length *= BACKTRACKS
-    return np.nan, np.nan
+    return np.nan, np.nan, length
+
+
+@inlined
+def remember(stages, step, before, length):
+    """Move the costates of the Hessian along the step, to those of its linear-quadratic problem.
+
+    The costates of a plan that is rolled out depend on it wildly where the model is unstable.
+    """
+    for i in range(1, len(step.v)):
+        for a in range(NX):
+            after = step.v[i, a]
+            for b in range(NX):
+                after += step.V[i, a, b] * step.x[i, b]
+            step.p[i, a] = before[i, a] + length * (after - before[i, a])
 
 
 @inlined
@@ -933,9 +949,9 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
     `where` is true if the last iterate stands in `trial`.
     """
     delta, iteration, polished, centred, ended, where = 0.0, 0, 0, False, LIMIT, False
-    added = 0.0
+    added, costates = 0.0, stages.p
     while True:
-        linearise(task, point, duals, stages)
+        linearise(task, point, duals, stages, costates)
         stationarity, complementarity, largest = residuals(task, point, duals, stages, mu)
         error = max(stationarity / largest, complementarity, mu)
         if not stationarity + complementarity < np.inf:  # `max` may lose a nan
@@ -967,17 +983,21 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
                 )
         delta = added if added > 0.0 else delta
         primal, dual, derivative = newton_step(task, point, duals, stages, mu, step)
-        reached, reached_total = search(task, point, trial, mu, step, primal, total, derivative)
+        reached, reached_total, length = search(
+            task, point, trial, mu, step, primal, total, derivative
+        )
         if reached == reached:
             point, trial, where, centred = trial, point, not where, False
             objective, total = reached, reached_total
             advance(task, duals, step, dual)
+            remember(stages, step, costates, length)
+            costates = step.p
         elif centred:
             ended = SOLVED if error <= tolerance else STALLED
             break
         else:
             recentre(task, point, duals, mu)
-            centred = True
+            centred, costates = True, stages.p
     return objective, iteration, ended, error, added, where
 
 
@@ -1090,7 +1110,8 @@ def allocate(N, rows):
     step = Step(
         np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((N + 1, NX)), np.empty((N, NU)),
         np.empty((N + 1) * rows), np.empty((N, NU)), np.empty((N, NU)),
-        np.empty((NX, NX)), np.empty(NX), np.empty(NX), np.empty((NX, NX)), np.empty((NX, NU)),
+        np.empty((N + 1, NX)), np.empty((N + 1, NX, NX)), np.empty((N + 1, NX)),
+        np.empty((NX, NX)), np.empty((NX, NU)),
         np.empty((NU, NU)), np.empty((NU, NX)), np.empty(NU),
     )  # fmt: skip
     return point, trial, duals, stages, step

@@ -25,7 +25,7 @@ from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
 
 PERTURBED = 4  # starts from random inputs, after everything else
-SEVERAL, FEW = 9, 2  # cold starts of a `Problem` with rows, and without
+SEVERAL = 5  # cold starts besides the one that feedback holds
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
 COLD, SHIFTED, SAME = map(
@@ -97,24 +97,18 @@ class Riccati(Solver):
 
     name: ClassVar[str] = NAME
     code: Callable[[Problem], Any] = field(default=machine_code, repr=False)
-    starts: int | None = None  # cold ones, of which the best plan counts; see `starts_of`
+    starts: int = SEVERAL  # cold ones, of which the best plan counts; from 2 on, one more that is
+    # held by feedback
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.starts is not None and positive_integer("starts", self.starts) > MOST:
+        if positive_integer("starts", self.starts) > MOST:
             raise ValueError(f"starts = {self.starts} must be at most {MOST}")
 
     @property
     def available(self) -> bool:
         """Whether numba is installed."""
         return jit.numba_version() is not None
-
-    def starts_of(self, problem: Problem) -> int:
-        """How many cold starts are compared: 9 where there are rows, else 2.
-
-        A problem whose model grows has one more, that of a `Regulator`.
-        """
-        return self.starts or (SEVERAL if problem.weights.size else FEW)
 
     def prepare(self, ocp: Ocp) -> "Compiled":
         """Load the machine code, or compile it.
@@ -141,9 +135,8 @@ class Compiled:
         self._size = self._split + ocp.theta.numel()
         self._no_action = np.zeros(problem.inputs)
         self.tolerance = solver.tolerance
-        count = solver.starts_of(problem) - 1
         N = problem.horizon
-        others = cold_inputs(problem, N, count)
+        others = cold_inputs(problem, N, solver.starts - 1)
         self.others = np.reshape(np.array(others), (-1, N, problem.inputs))
         self.drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
         sides = [

@@ -223,7 +223,7 @@ def slopes(
             point.x[i, a] = solved[z + a]
     measure(task, point, ROWS)
     restore_rows(task, duals, factor, solved)
-    linearise(task, point, duals, stages)
+    linearise(task, point, duals, stages, stages.p)
     condense(task, point, duals, stages, mu)
     step.lam[:] = 0.0
     if not independent(task, stages, step):

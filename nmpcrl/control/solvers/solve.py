@@ -64,7 +64,7 @@ def solve(
     if not cold and recall(task, start, warm_start, point, trial):
         measure(task, trial, mu)
         begin_rows(task, trial, duals, start, mu, factor, warm_start)
-        linearise(task, trial, duals, stages)
+        linearise(task, trial, duals, stages, stages.p)
         condense(task, trial, duals, stages, mu)
         added = 0.0
         while not factorise(stages, added, task.first, step) and added < DELTA_LARGEST:
