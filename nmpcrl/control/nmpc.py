@@ -135,7 +135,7 @@ class Nmpc(Described):
         state = _checked("state", state, self.n, self.farthest)
         theta = _checked("theta", theta, self.problem.theta.size, self.largest)
         known = self.problem.stage_data(data)
-        if (theta < self._bending.least).any():
+        if min(theta.tolist()) < 0.0 and (theta < self._bending.least).any():
             self._bending.judge(state, theta, known)
         given: tuple[Vector, ...] = ()
         if action is not None:
