@@ -452,11 +452,11 @@ def _spread(name: str, bound: Any, start: Matrix) -> Vector:
 
 
 def _bounds(of: str, lower: Any, upper: Any, count: int) -> tuple[Vector, Vector]:
-    sides, one = [], "state" if of else "input"
+    sides, (one, each) = [], ("state", "a state") if of else ("input", "an input")
     for name, value in ((f"{of}lower", lower), (f"{of}upper", upper)):
         side = np.array(value, float)
         if side.shape not in ((), (1,), (count,)) or np.isnan(side).any():
-            raise ValueError(f"{name} = {value!r} must hold {count} numbers, one an {one}")
+            raise ValueError(f"{name} = {value!r} must hold {count} numbers, one {each}")
         sides.append(read_only(np.broadcast_to(side, count)))
     if not (sides[0] < sides[1]).all():
         raise ValueError(

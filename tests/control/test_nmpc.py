@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, Obstacle, Plant, SolverError, Task, differential_drive
 from nmpcrl.control import nmpc as module
-from nmpcrl.control.solvers import SOLVERS, riccati
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -48,39 +48,27 @@ def test_a_fixed_action_is_the_first_input_at_its_bound_too(robot, draw):
             assert (np.abs(solution.inputs[1:]) <= upper).all()
 
 
-def test_a_solution_carries_everything_that_learning_reads(robot):
-    solution = robot.solve(START, THETA)
-    assert isinstance(solution.value, float)
-    assert solution.features.shape == (9,)
-    assert solution.states.shape == (11, 3)
-    assert solution.inputs.shape == (10, 2)
-    assert solution.slacks.shape == (11, 4)
-    np.testing.assert_array_equal(solution.action, solution.inputs[0])
-    np.testing.assert_array_equal(solution.next_action, solution.inputs[1])
-    np.testing.assert_array_equal(solution.state, START)
-    np.testing.assert_array_equal(solution.theta, THETA)
-    assert solution.iterations > 0
-    assert solution.seconds > 0
-    assert solution.status == "solved"
-    assert solution.multipliers.action.shape == (0,)
-
-
-def test_multipliers_have_the_signs_that_are_promised(robot, draw):
-    discount = 0.97 ** np.arange(11)[:, None]
+def test_a_solution_carries_what_learning_reads_and_multipliers_with_their_signs(robot, draw):
+    price = 100 * 0.97 ** np.arange(11)[:, None] * np.ones(4)
     for state, theta in draw(10, seed=33):
         solution = robot.solve(state, theta)
-        m = solution.multipliers
-        assert m.dynamics.shape == (10, 3)
+        m, shapes = solution.multipliers, [(11, 3), (10, 2), (11, 4), (10, 3), (0,), (9,)]
+        parts = (solution.states, solution.inputs, solution.slacks, m.dynamics, m.action)
+        assert [part.shape for part in (*parts, solution.features)] == shapes
+        assert isinstance(solution.value, float)
+        assert solution.iterations > 0
+        assert solution.seconds > 0
+        assert solution.status == "solved" or solution.restarts
+        np.testing.assert_array_equal(solution.action, solution.inputs[0])
+        np.testing.assert_array_equal(solution.state, state)
+        np.testing.assert_array_equal(solution.theta, theta)
         assert (m.obstacles >= -1e-6).all()
-        assert (m.obstacles <= 100 * discount + 1e-6).all()
+        assert (m.obstacles <= price + 1e-6).all()
         assert (m.slacks <= 1e-6).all()
-        np.testing.assert_allclose(m.obstacles - m.slacks, 100 * discount + 0 * m.slacks, atol=1e-4)
+        np.testing.assert_allclose(m.obstacles - m.slacks, price, atol=1e-4)
         pressed = np.abs(m.inputs) > 1e-2
-        np.testing.assert_allclose(
-            solution.inputs[pressed],
-            (np.sign(m.inputs) * robot.plant.upper)[pressed],
-            atol=1e-5,
-        )
+        bounds = np.sign(m.inputs) * robot.plant.upper
+        np.testing.assert_allclose(solution.inputs[pressed], bounds[pressed], atol=1e-5)
 
 
 def test_the_value_at_the_start_is_about_a_thousand(robot):
@@ -92,7 +80,7 @@ def test_the_value_at_the_start_is_about_a_thousand(robot):
 
 def test_the_sign_of_a_weight_means_nothing(robot):
     negated = THETA * [-1, 1, -1, 1, -1, 1, -1, 1, 1]
-    one, other = robot.solve(START, THETA), robot.solve(START, negated)
+    one, other = robot.solve(START.tolist(), THETA.tolist()), robot.solve(START, negated)
     assert other.value == pytest.approx(one.value, rel=1e-9)
     np.testing.assert_allclose(
         other.features, one.features * np.sign(negated), rtol=1e-5, atol=1e-5
@@ -192,11 +180,6 @@ def test_an_action_may_be_as_large_as_its_bounds():
     assert again.value == pytest.approx(plan.value)
 
 
-def test_lists_of_numbers_will_do(robot):
-    solution = robot.solve([-2.5, 1.5, 0], list(paper.THETA_INIT))
-    assert solution.value == robot.solve(START, THETA).value
-
-
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
@@ -230,7 +213,8 @@ def test_a_controller_refuses_nonsense_and_says_which(changed, message):
 @pytest.mark.slow
 def test_a_smaller_tolerance_buys_exactness_with_iterations(solver, draw):
     """From 1e-2 to 1e-12, both ends of what is allowed; 1e-8 is what is taken when none is said."""
-    nmpcs = [paper.nmpc(solver=SOLVERS[solver](tolerance=t)) for t in (1e-2, 1e-5, 1e-8, 1e-12)]
+    kind = SOLVERS[solver]
+    nmpcs = [paper.nmpc(solver=how) for how in (kind(1e-2), kind(1e-5), kind(), kind(1e-12))]
     solved = [[nmpc.solve(*problem) for problem in draw(20, seed=34)] for nmpc in nmpcs]
     iterations = [sum(one.iterations for one in each) for each in solved]
     assert iterations == sorted(iterations)
@@ -239,16 +223,4 @@ def test_a_smaller_tolerance_buys_exactness_with_iterations(solver, draw):
     ]
     assert (np.diff(residuals) < 0).all()
     assert residuals[-1] < 1e-6 * residuals[0]
-    default = paper.nmpc(solver=solver)
-    for one, (state, theta) in zip(solved[2], draw(20, seed=34), strict=True):
-        np.testing.assert_array_equal(one.point, default.solve(state, theta).point)
-
-
-def test_solver_and_derivatives_are_compiled_ahead(monkeypatch):
-    asked = []
-    monkeypatch.setattr(riccati, "slopes_code", lambda _: asked.append("derivatives"))
-    solver = riccati.Riccati(code=lambda _: asked.append("solver"))
-    paper.nmpc(solver=solver).compile()
-    assert asked == ["solver", "derivatives"]
-    paper.nmpc(solver="fatrop").compile()  # which has nothing to compile
-    assert len(asked) == 2
+    assert kind() == kind(1e-8)

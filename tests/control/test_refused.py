@@ -28,13 +28,10 @@ WITH_DATA = {"model": lambda x, u, th, d: x + u, "stage": lambda x, u, th, d: u*
 
 def problem(**changes) -> Problem:
     fields = {
-        "states": 2,
-        "inputs": 1,
-        "horizon": 3,
-        "theta": {"alpha": 1.0, "A": np.eye(2)},
+        "states": 2, "inputs": 1, "horizon": 3, "theta": {"alpha": 1.0, "A": np.eye(2)},
         "model": lambda x, u, th: th["A"] @ x + u,
         "stage": lambda x, u, th: ca.sumsqr(x) + th["alpha"] * ca.sumsqr(u),
-    }
+    }  # fmt: skip
     return Problem(**fields | changes)
 
 
@@ -88,10 +85,7 @@ def problem(**changes) -> Problem:
         ({"hard": [Hard(lambda x, u, th: th["alpha"])]}, r"hard\[0\] has a row that depends on"),
         ({"hard": [Hard(lambda x, u, th: u, stages=[3])]}, r"hard\[0\] depends on u, and there"),
         ({"state_lower": 1, "state_upper": 0}, r"state_lower = .* must lie below state_upper"),
-        (
-            {"state_upper": [1, 2, 3]},
-            r"state_upper = .* must hold 2 numbers, one an state",
-        ),
+        ({"state_upper": [1, 2, 3]}, r"state_upper = .* must hold 2 numbers, one a state"),
         ({"soft": Soft(lambda x, u, th: x, each="discs")}, r"soft\[0\].each = 'discs' must be the"),
         (
             {"soft": Soft(lambda x, u, th, d: x, each="at"), "data": {"at": [1.0]}, **WITH_DATA},
@@ -140,31 +134,17 @@ def test_a_plan_that_leaves_all_numbers_is_no_solution(solver):
 @pytest.mark.parametrize(
     ("changes", "state", "message"),
     [
-        (
-            {"stage": lambda x, u, th: th["alpha"] * ca.log(x[1]) + u**2},
-            [1.0, 0.0],
-            r"; stage is -inf at x = \[1. 0.\], u = \[0.\]: keep it finite, as ca.log\(ca.fmax",
-        ),
-        (
-            {
-                "stage": lambda x, u, th: ca.sumsqr(u),
-                "model": lambda x, u, th: [x[0], ca.sqrt(-x[1])],
-            },
-            [1.0, 2.0],
-            r"; model\[1\] is nan at x = \[1. 2.\], u = \[0.\]",
-        ),
-        (
-            {"stage": lambda x, u, th: -ca.norm_2(x - 1) + u**2},
-            [1.0, 1.0],
-            r"; the derivative of stage is nan at .*: write ca.sqrt\(ca.sumsqr\(x\) \+ 1e-9\)",
-        ),
-        (
-            {"soft": [Soft(lambda x, u, th: [x[0], -(ca.fabs(x[1]) ** 1.5) - x[0]])]},
-            [-1e300, 0.0],
-            "state .* must hold finite numbers",
-        ),
+        ({"stage": lambda x, u, th: th["alpha"] * ca.log(x[1]) + u**2}, [1.0, 0.0],
+         r"; stage is -inf at x = \[1. 0.\], u = \[0.\]: keep it finite, as ca.log\(ca.fmax"),
+        ({"stage": lambda x, u, th: u**2, "model": lambda x, u, th: [x[0], ca.sqrt(-x[1])]},
+         [1.0, 2.0], r"; model\[1\] is nan at x = \[1. 2.\], u = \[0.\]"),
+        ({"stage": lambda x, u, th: -ca.norm_2(x - 1) + u**2}, [1.0, 1.0],
+         r"; the derivative of stage is nan at .*: write ca.sqrt\(ca.sumsqr\(x\) \+ 1e-9\)"),
+        ({"hard": Hard(lambda x, u, th: ca.log(x) - u)}, [1.0, 0.0], r"; rows\[1\] is -inf at"),
+        ({"soft": Soft(lambda x, u, th: [x[0], -(ca.fabs(x[1]) ** 1.5) - x[0]])}, [-1e300, 0.0],
+         "state .* must hold finite numbers"),
     ],
-)
+)  # fmt: skip
 def test_what_is_not_finite_where_a_plan_begins_is_named(solver, changes, state, message):
     nmpc = Nmpc(problem(**changes), solver=solver)
     with pytest.raises((SolverError, ValueError), match=message) as caught:
@@ -277,14 +257,11 @@ def test_substeps_make_a_fast_model_one_that_can_be_planned_with():
             return ca.vertcat((u - 0.5 * x[0] - 0.01 * x[1]) / 1e-3, (x[0] - 0.1 * x[1]) / 0.1)
 
         return problem(
-            theta={"target": 5.0},
-            horizon=5,
+            theta={"target": 5.0}, horizon=5, lower=-12, upper=12,
             model=lambda x, u, th: rk4(dynamics, x, u, 0.01, substeps=substeps),
             stage=lambda x, u, th: (x[1] - th["target"]) ** 2 + 1e-3 * u**2,
             terminal=lambda x, th: 10 * (x[1] - th["target"]) ** 2,
-            lower=-12,
-            upper=12,
-        )
+        )  # fmt: skip
 
     with pytest.raises(SolverError, match=r"model makes 1e\+01 times .* substeps"):
         Nmpc(motor(1), solver="ipopt").solve(np.array([900.0, 0.0]), motor(1).theta)
