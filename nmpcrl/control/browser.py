@@ -109,9 +109,8 @@ def problem(
     """What a host is given beside the module, as JSON takes it.
 
     These are the sizes that `solvers.model` names, the units of states and inputs, in which all
-    else is given, and the `ARRAYS`: `riccati.Arguments` with `kind` for u_0 free and given, inputs
-    of the cold starts that are `few` where there is no row, and `drawn` ones. A W of None is
-    infinite.
+    else is given, and the `ARRAYS`: `riccati.Arguments` with `kind` for u_0 free and given, and the
+    inputs of `others` and `drawn`, which `find` explains. A W of None is infinite.
     """
     solved, e = of.solved, of.expressions
     ocps = [transcribe(solved, fix_action=one, ties_active=ties_active) for one in (False, True)]
@@ -119,7 +118,7 @@ def problem(
     fixed = e.fixed.numel()
     parts = free.arguments._asdict() | {
         "kind": [free.arguments.kind, given.arguments.kind],
-        "weights": np.where(of.soft, of.weights, None),
+        "weights": [weight if weight < np.inf else None for weight in of.weights.tolist()],
         "others": free.others,
         "drawn": free.drawn,
         "units": of.sizes[0],
@@ -134,7 +133,6 @@ def problem(
         "per": e.each.numel(),
         "own": of.own_size,
         "width": e.line.numel(),
-        "few": len(free.others) if solver.starts else riccati.FEW - 1,
         "tolerance": solver.tolerance,
     }
 

@@ -77,9 +77,9 @@ class Nmpc(Described):
                 other side of a kink in theta_c.  # departure L
         """
         self.solver = solver_of(solver)
-        self.plant: Plant | None = None  # what predicts and what is asked of it, where there is a
-        self.task: Task | None = None  # task
-        self.slack_weight: float | None = None
+        self.plant: Plant = None  # type: ignore[assignment]  # where there is no task, as the next
+        self.task: Task = None  # type: ignore[assignment]
+        self.slack_weight: float = None  # type: ignore[assignment]
         if isinstance(plant, Problem):
             if task is not None or (horizon, gamma, slack_weight) != (HORIZON, GAMMA, SLACK_WEIGHT):
                 raise ValueError(

@@ -133,7 +133,9 @@ class Task(Described):
             slack_weight,
             each="discs",
         )
-        hard = {} if self.soft_box else {"state_lower": self.lower, "state_upper": self.upper}
+        hard: dict[str, Any] = (
+            {} if self.soft_box else {"state_lower": self.lower, "state_upper": self.upper}
+        )
         return Problem(
             states=plant.n,
             inputs=plant.m,
@@ -189,7 +191,7 @@ class Task(Described):
         return known[inputs](state, action, NO_DATA)
 
     @cached_property
-    def _charges(self) -> dict[int, Callable[[Vector, Vector], float]]:
+    def _charges(self) -> dict[int, Callable[..., float]]:
         """The same as machine code, by the number of inputs."""
         return {}
 
@@ -204,7 +206,8 @@ class Task(Described):
     def entered(self, state: ca.SX, x: Any, y: Any, clearance: Any) -> ca.SX:
         """How far the margins of discs are entered, in Xi."""
         plane = state if state.numel() > 1 else ca.vertcat(state, 0)  # where no obstacle stands
-        return ca.fmax(0, overlap(plane[0], plane[1], x, y, clearance) + self.margin)
+        found: ca.SX = ca.fmax(0, overlap(plane[0], plane[1], x, y, clearance) + self.margin)
+        return found
 
     def cost_of(self, state: ca.SX, action: ca.SX, target: Any, total: Any) -> ca.SX:
         """Eq. (20) in symbols, for any target and a total of what is `entered`."""

@@ -32,9 +32,8 @@
     const all = (of) => [...rows(of), ...of.slice(of.length - sides.length)];
     const kind = problem.kind.map((of) => data.map((_, i) => all(of[i < N ? i : last])));
     const weights = rows(problem.weights).map((one) => one ?? Infinity);
-    const others = problem.others.slice(0, weights.length ? Infinity : problem.few);
-    const starts = [...others, ...problem.drawn].map((inputs) => inputs.slice(0, N));
-    const head = [N, lines, sides.length, others.length, problem.drawn.length, problem.tie];
+    const starts = [...problem.others, ...problem.drawn].map((inputs) => inputs.slice(0, N));
+    const head = [N, lines, sides.length, problem.others.length, problem.drawn.length, problem.tie];
     return [head, data, lower, upper, sides, kind, problem.discount.slice(0, N + 1), weights, starts].flat(Infinity);
   }
 
