@@ -24,7 +24,7 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
     The module has the solver, the update rules and the network, and runs in any
     browser, in Node and in engines such as wasmtime. The problem is an argument
     of its functions: a file beside it, with .json for .wasm, has its numbers as
-    one array, and its sizes. Compilation takes a minute or two, once.
+    one array, its sizes, and where theta starts. Compilation takes a minute or two, once.
     MODULE:NAME may be a function that returns a Plant, a Task or a Problem.
 
     \b
@@ -52,12 +52,13 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
         if start != states:
             raise click.ClickException(f"the task has {start} states, the plant {states}")
     try:
-        module, described = browser.module(*of), alone.problem(Nmpc(*of).problem)
+        solved, module = Nmpc(*of).problem, browser.module(*of)
+        described = alone.problem(solved)
     except (CannotCompile, RuntimeError) as error:
         raise click.ClickException(str(error)) from None
     out.write_bytes(module)
-    numbers = {"numbers": alone.packed(described).tolist()}
-    out.with_suffix(".json").write_text(json.dumps(described | numbers))
+    described |= {"numbers": alone.packed(described).tolist(), "start": solved.theta.tolist()}
+    out.with_suffix(".json").write_text(json.dumps(described))
     name, size = click.format_filename(out), len(module) / 1000
     click.echo(f"{name}: {size:.0f} kB; its host gives it functions of JavaScript's Math.")
 
