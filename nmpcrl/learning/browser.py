@@ -1,19 +1,105 @@
-"""Everything that learns in a browser, as one WebAssembly module."""
+"""The module with which a robot learns in a browser: solver, plant, cost and Algorithm 1."""
 
 from importlib.resources import files
 
 from nmpcrl.control import Plant, Problem, Task, browser
 from nmpcrl.control.codegen.browser import from_texts
 
-OWN = ("updates", "loop", "rules", "dense", "network_entries")
+OWN = ("updates", "dense", "loop")
+LEARN = '''"""What is called to learn: `loop` on pointers, as in `entries`."""
+
+import numpy as np
+from numba import carray, float32, float64, int32, int64, njit, types, uint64
+
+from .charge import charge
+from .dense import at_addresses, fit, follow, predict, remember
+from .entries import COLD, address, lengths, unpacked
+from .find import find
+from .loop import COUNT, _td_error, copy, episode, move, plain, start_in
+from .model import NTHETA, NU, NX, transition
+from .slopes import slopes
+
+HOW = 9  # numbers of a learner besides the bounds of theta
+NONE = np.zeros(1)  # neither theta nor data is read by the model of a plant
+NETWORK = (  # the arrays of `dense`, with the rate among them; length of an input, and capacity
+    *map(types.CPointer, (float32, float32, int32, int64, uint64, float64)), float64,
+    types.CPointer(int64), int32, int32,
+)  # fmt: skip
+steps = plain(episode)
+
+
+@plain
+def step(state, action, later):
+    transition(state, action, NONE, NONE, later)
+
+
+@njit(
+    int32(address, address, *NETWORK, address, address, address, address, int32, address, address),
+    error_model="numpy",
+)
+def learn(
+    problem, learner, weights, examples, order, counts, draw, scales, rate, sizes, inputs, capacity,
+    state, theta, w, warm, cold, noise, row,
+):  # fmt: skip
+    """One step of Algorithm 1; returns 1, or 0 where a solve failed.
+
+    `learner` holds rule, alpha, beta, bootstrap, whether theta is an input of the network, whether
+    Q(s, a) is learned, the tolerance, the largest number of a state and of theta, and the least and
+    the largest theta. `cold` says that an episode begins; `row` is one of `loop.episode`.
+    """
+    (given, others, drawn), (fixed, _, _) = unpacked(problem, 0), unpacked(problem, 1)
+    (z, lam), N = lengths(given, 0), len(given[5]) - 1
+    how = carray(learner, HOW + 2 * NTHETA)
+    next_input = NX  # where u_1 is: behind x_0, u_0, the slacks of a stage, and x_1
+    if N > 1:
+        next_input = NX + NU + (z - N * NU) // (N + 1)
+    net = at_addresses(
+        weights, examples, order, counts, draw, scales, rate, sizes, inputs, capacity
+    )
+    state_, warm_, start = carray(state, NX), carray(warm, 2 * z + lam), COLD
+    if not cold:
+        start = start_in(state_, warm_)
+    return steps(
+        find, slopes, step, charge, remember, fit, predict, follow,
+        given, fixed, others, drawn, how[6], z + 2 * NX, next_input, how[7],
+        how[8], int(how[0]), how[1], how[2], how[HOW : HOW + NTHETA], how[HOW + NTHETA :],
+        int(how[3]), net, net, (how[4] > 0, True, False, 1, 0, 0.0), how[5] > 0, True,
+        start, 0, state_, carray(theta, NTHETA),
+        carray(w, NTHETA), warm_, carray(noise, (1, NU)),
+        carray(row, (1, COUNT + NX + NU + 3 * NTHETA)),
+    )  # fmt: skip
+
+
+@njit(float64(float64, float64, float64, float64), error_model="numpy")
+def td_error(cost, gamma, q, q_next):
+    """Eq. (7)."""
+    return _td_error(cost, gamma, q, q_next)
+
+
+@njit(
+    int32(int32, int32, address, address, float64, address, address, float64, float64, float64),
+    error_model="numpy",
+)
+def moved(rule, d, theta, w, delta, phi, phi_next, alpha, beta, gamma):
+    """Move theta and w, in place, by a semi-gradient or by gradient TD."""
+    there, w_, phi_ = carray(theta, d), carray(w, d), carray(phi, d)
+    after = move(rule, there, w_, delta, phi_, carray(phi_next, d), phi_, alpha, beta, gamma)
+    copy(after, there)
+    return 0
+
+
+EXPORTS = (learn, td_error, moved)
+'''
 
 
 def module(of: Plant | Problem, task: Task | None = None) -> bytes:
-    """`control.browser.module` with what `rules` and `network_entries` describe.
+    """`control.browser.module`, and with a task what `LEARN` describes.
 
     Raises:
         CannotCompile, RuntimeError, CannotLink: as there.
     """
+    if task is None:
+        return browser.module(of)
     here = files(__package__)
     own = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in OWN}
-    return from_texts(browser.texts(of, task) | own)
+    return from_texts(browser.texts(of, task) | own | {"learn": LEARN})

@@ -75,6 +75,13 @@ _curvature_correction = translated(curvature_correction, dot=_dot)
 
 
 @plain
+def copy(numbers, there):
+    """Write numbers there: shapes are not looked at, which a browser could not complain of."""
+    for k in range(len(numbers)):
+        there[k] = numbers[k]
+
+
+@plain
 def usable(numbers, largest):
     """Whether every number is finite and of size at most `largest`."""
     for k in range(len(numbers)):  # noqa: SIM110  numba compiles no generators
@@ -95,12 +102,22 @@ def start_in(state, warm):
 @plain
 def carried(old, place, count, new):
     """Copy a solution, with `count` more multipliers at `place`, or -`count` of them left out."""
-    new[:place] = old[:place]
-    if count > 0:
-        new[place : place + count] = 0.0
-        new[place + count :] = old[place:]
-    else:
-        new[place:] = old[place - count :]
+    copy(old[:place], new)
+    for k in range(place, place + count):
+        new[k] = 0.0
+    copy(old[place + max(0, -count) :], new[place + max(0, count) :])
+
+
+@plain
+def move(rule, theta, w, delta, phi, phi_next, product, alpha, beta, gamma):
+    """The next theta; w moves in place, and `product` is that of the Hessian with w."""
+    if rule == SEMI_GRADIENT:
+        return _semi_gradient_step(theta, delta, phi, alpha)
+    moved = _gradient_td_step(theta, w, delta, phi, phi_next, alpha, gamma)
+    if rule == EXACT:
+        moved = moved - alpha * _curvature_correction(delta, phi, w, product)
+    copy(_auxiliary_step(w, delta, phi, beta), w)
+    return moved
 
 
 @plain
@@ -218,7 +235,7 @@ def episode(
         cost = charge(state, action, problem[0][0])
         if not usable(later, farthest):
             return t
-        solution[:] = plan[:split]
+        copy(plan[:split], solution)
         if constrained:
             carried(solution, place, m, point)
             value, taken, end, beyond, _, failed = find(
@@ -261,24 +278,18 @@ def episode(
             )  # fmt: skip
         delta = _td_error(cost, gamma, value, next_value)
         if known:
-            if rule == SEMI_GRADIENT:
-                moved = _semi_gradient_step(theta, delta, phi, alpha)
-            else:
-                moved = _gradient_td_step(theta, w, delta, phi, successor[split:], alpha, gamma)
-                if rule == EXACT:
-                    moved = moved - alpha * _curvature_correction(delta, phi, w, product)
-                w[:] = _auxiliary_step(w, delta, phi, beta)
-            theta[:] = _project(moved, least, most)
+            moved = move(rule, theta, w, delta, phi, successor[split:], product, alpha, beta, gamma)
+            copy(_project(moved, least, most), theta)
         numbers = (
             cost, value, next_value, delta, loss, restarts, violation, iterations, float(solves),
         )  # fmt: skip
-        rows[t, :COUNT] = np.array(numbers)
+        copy(numbers, rows[t])
         at = COUNT
         for part in (state, action, phi, theta, w):
-            rows[t, at : at + len(part)] = part
+            copy(part, rows[t, at:])
             at += len(part)
-        state[:] = later
-        warm[:] = successor[:split] if bootstrap == SECOND_SOLVE else solution
+        copy(later, state)
+        copy(successor[:split] if bootstrap == SECOND_SOLVE else solution, warm)
         start = start_in(state, warm)
         if not usable(theta, largest) or not usable(w, largest):
             return t + 1

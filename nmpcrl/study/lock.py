@@ -28,7 +28,7 @@ FILES = (  # whose code bears on numbers of runs, summaries and searches
 )
 OTHER_HOSTS = (  # of `FILES`, compiled for browsers and hosts where no stored run is made
     *("control/browser.py", "control/codegen/browser/", "learning/browser.py"),
-    *("control/solvers/entries.py", "learning/rules.py"),
+    "control/solvers/entries.py",
 )
 ROOT = Path(__file__).parent.parent
 LOCK = Path(__file__).with_name("sources.lock.json")

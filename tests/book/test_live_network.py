@@ -8,7 +8,6 @@ import pytest
 
 from nmpcrl.learning.network import DRAW, QNetwork
 from nmpcrl.report.live import frame, noise, two_learners
-from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.problem import problem_of
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.setup import controller_of
@@ -30,24 +29,11 @@ TRAINED = """async ({ module, problem, settings, widths }) => {
 }"""
 
 
-FAILING = """settings => {  // no solve finds a plan
+DIVERGED = """async ({ module, problem, settings }) => {
+  const { solver, train } = window.nmpcrl, nmpc = await solver(module, problem)
   const noise = new Float64Array(2 * settings.episodes * settings.steps)
-  const problem = { lower: [-1, -1], upper: [1, 1], discount: [1, 0.9] }
-  const nmpc = { problem, rules: {}, solve: () => null }
-  return Array.from(window.nmpcrl.train(nmpc, settings, noise), ({ diverged }) => diverged)
+  return Array.from(train(nmpc, settings, noise), ({ diverged }) => diverged)
 }"""
-ABSURD = """settings => {  // every update moves theta by a half
-  const noise = new Float64Array(2 * settings.episodes * settings.steps)
-  const problem = { lower: [-1, -1], upper: [1, 1], discount: [1, 0.9] }
-  const plan = { action: [0, 0], value: 1, features: [1, 1] }
-  const rules = { tdError: () => 1, semiGradient: ([theta, other]) => [theta + 0.5, other] }
-  const nmpc = { problem, rules, solve: () => plan, cost: () => 1, step: (state) => state }
-  return Array.from(window.nmpcrl.train(nmpc, settings, noise), ({ diverged }) => diverged)
-}"""
-SHORT = {
-    "learner": "ES", "alpha": 1, "decay": "step", "decayRate": 1, "episodes": 12, "steps": 1,
-    "theta": [1, -1], "w": [0, 0], "start": [0], "target": [0], "discs": [], "horizon": 1,
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -75,17 +61,22 @@ def test_a_network_begins_as_in_python_in_every_bit(page):
             assert int(drawn["draw"]) == expected.net[DRAW][0]
 
 
-def test_a_divergence_is_what_the_library_calls_one(page):
+def test_a_divergence_is_what_the_library_calls_one(page, robot_module):
     """The page holds no number of its own: with others it ends elsewhere."""
-    limits = fixed()["limits"]
+    experiment = Experiment(episodes=12, steps=1)
+    settings = given_to_page(robot_module, experiment)["settings"]
+    limits = settings["limits"]
+
+    def diverged(**changes):
+        given = given_to_page(robot_module, experiment)
+        return page.evaluate(DIVERGED, given | {"settings": settings | changes})
+
+    nowhere = [float("nan"), 0.0, 0.0]  # where no solve finds a plan
     for patience in (limits["patience"], 3):
-        given = SHORT | {"limits": limits | {"patience": patience}}
-        assert page.evaluate(FAILING, given) == [False] * (patience - 1) + [True]
-    for absurd in (2.4, 4.0):
-        given = SHORT | {"limits": limits | {"absurd": absurd}}
-        moved = int((absurd - 1) / 0.5)
-        assert page.evaluate(ABSURD, given) == [False] * moved + [True]
-    assert page.evaluate(ABSURD, SHORT | {"limits": limits}) == [False] * SHORT["episodes"]
+        found = diverged(start=nowhere, limits=limits | {"patience": patience})
+        assert found == [False] * (patience - 1) + [True]
+    assert diverged(limits=limits | {"absurd": 0.5}) == [True]
+    assert diverged() == [False] * experiment.episodes
 
 
 def test_a_network_of_another_size_is_that_of_the_library(page, robot_module, monkeypatch):
@@ -98,22 +89,23 @@ def test_a_network_of_another_size_is_that_of_the_library(page, robot_module, mo
 @pytest.mark.parametrize(("layout", "decay", "seed"), [("A", "step", 0), ("C", "episode", 1)])
 def test_a_run_is_that_of_the_library(page, robot_module, learner, layout, decay, seed):
     """Equal until the first fit, then to single precision; 4e-7 is the farthest seen so early."""
-    experiment = Experiment(learner=learner, layout=layout, decay=decay, seed=seed, episodes=3)
+    experiment = Experiment(learner=learner, layout=layout, decay=decay, seed=seed, episodes=2)
     assert_a_run_is_that_of_the_library(page, robot_module, experiment)
 
 
-def assert_a_run_is_that_of_the_library(page, robot_module, experiment: Experiment) -> None:
+def given_to_page(robot_module: bytes, experiment: Experiment) -> dict:
     nmpc = controller_of(experiment)
     given = {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
-    found = page.evaluate(
-        TRAINED,
-        {
-            "module": b64encode(gzip.compress(robot_module)).decode(),
-            "problem": problem_of(nmpc),
-            "settings": two_learners.settings(experiment, experiment.learner, nmpc) | given,
-            "widths": noise.widths(),
-        },
-    )
+    return {
+        "module": b64encode(gzip.compress(robot_module)).decode(),
+        "problem": problem_of(nmpc),
+        "settings": two_learners.settings(experiment, experiment.learner, nmpc) | given,
+        "widths": noise.widths(),
+    }
+
+
+def assert_a_run_is_that_of_the_library(page, robot_module, experiment: Experiment) -> None:
+    found = page.evaluate(TRAINED, given_to_page(robot_module, experiment))
     expected = run(experiment).steps
     before = paper.BATCH - 1  # steps without a fit
     theta = np.array([step["theta"] for step in found])

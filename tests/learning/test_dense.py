@@ -1,6 +1,5 @@
 """The network's machine code: mini-batches are drawn fairly, and WebAssembly computes the same."""
 
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -10,13 +9,45 @@ from wasm_host import Module
 from nmpcrl.control.codegen.browser import from_texts
 from nmpcrl.learning.network import TEXT, QNetwork, machine_code
 
+ARRAYS = "weights, examples, order, counts, draw, scales, rate, sizes, inputs, capacity"
+ENTRIES = f"""
+import numpy as np
+from numba import carray, float32, float64, int32, int64, njit, types, uint64
+
+from .dense import at_addresses, fit, predict, remember
+
+singles, numbers, integers, counts, states = map(
+    types.CPointer, (float32, float64, int32, int64, uint64)
+)
+NET = (singles, singles, integers, counts, states, numbers, float64, counts, int32, int32)
+
+
+@njit(int32(*NET, numbers, float64))
+def network_remember({ARRAYS}, row, target):
+    remember(at_addresses({ARRAYS}), carray(row, inputs), target)
+    return 0
+
+
+@njit(float64(*NET))
+def network_fit({ARRAYS}):
+    return fit(at_addresses({ARRAYS}))
+
+
+@njit(float64(*NET, numbers))
+def network_predict({ARRAYS}, row):
+    value = np.empty(1)
+    predict(at_addresses({ARRAYS}), carray(row, (1, inputs)), value)
+    return value[0]
+
+
+EXPORTS = (network_remember, network_fit, network_predict)
+"""
 EXAMPLES, INPUTS = 300, 14
 
 
 @pytest.fixture(scope="module")
 def module() -> Module:
-    text = files("nmpcrl.learning").joinpath("network_entries.py").read_text("utf-8")
-    return Module(from_texts({"dense": TEXT, "network_entries": text}))
+    return Module(from_texts({"dense": TEXT, "entries": ENTRIES}))
 
 
 def network(activation: str = "relu", **options: Any) -> QNetwork:

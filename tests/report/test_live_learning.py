@@ -10,7 +10,7 @@ from raising import raising
 
 from nmpcrl.analysis import two_state
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.control.nmpc import ABSURD, FAR
 from nmpcrl.learning import browser, training
 from nmpcrl.report import live
 from nmpcrl.report.figures.style import LOOKS
@@ -85,7 +85,11 @@ def test_both_learners_begin_as_the_experiment_does(figure):
         assert settings["horizon"] == 7
         assert settings["beta"] == paper.BETA
         assert settings["zeta"] == paper.ZETA
-        assert settings["limits"] == {"absurd": ABSURD, "patience": training.PATIENCE}
+        assert settings["limits"] == {
+            "absurd": ABSURD,
+            "far": FAR,
+            "patience": training.PATIENCE,
+        }
         assert settings["network"] == {"hidden": paper.HIDDEN, "batch": paper.BATCH}
 
 

@@ -25,9 +25,7 @@
       if (learner === "ES") {
         theta = rules.semiGradient(theta, delta, phi, alpha);
       } else {
-        const moved = rules.gradientTd(theta, w, delta, phi, phiNext, alpha, gamma);
-        w = rules.auxiliary(w, delta, phi, beta);
-        theta = moved;
+        ({ theta, w } = rules.gradientTd({ theta, w, delta, phi, phiNext, alpha, beta, gamma }));
       }
       return now;
     });

@@ -1,140 +1,95 @@
-// Algorithm 1 in this page, as nmpcrl/learning/training.py has it, on the compiled solver and update rules.
+// Algorithm 1 in this page: nmpcrl/learning/loop.py makes each step, compiled with the solver.
 //
 // `settings`: { learner, alpha, beta, zeta, decay, decayRate, seed, episodes, steps, theta, w, thetaSet,
-// evaluateEvery, start, target, discs, horizon, limits: { absurd, patience }, network: { hidden, batch } }; `noise` holds epsilon, shape (episodes, steps, m).
+// evaluateEvery, start, target, discs, horizon, limits: { absurd, far, patience }, network: { hidden, batch } }; `noise` holds epsilon, shape (episodes, steps, m).
 (function learning() {
   "use strict";
 
-  // ---- Where the value of the next state comes from: { value, features, warm }, of which `warm` is what the next
-  // solve starts from, and `value` null if there is nothing to go by yet; null where a solve failed
+  // ---- The learners, in the numbers of loop.py
 
-  const secondSolve = (nmpc) => ({ here, solution, next }) => {
-    const solved = nmpc.solve({ ...here, state: next }, { warm: solution });
-    return solved && { value: solved.value, features: solved.features, warm: solved };
-  };
-
-  // A network imitates the NMPC's value: remember, fit, predict.
-  const imitation = (withTheta) => ({ problem, wasm }, { seed, zeta, episodes, steps, network: sizes }) => {
-    const { network, generator } = self.nmpcrl;
-    const inputs = problem.target.length + problem.lower.length + (withTheta ? problem.theta : 0);
-    const all = { inputs, ...sizes, capacity: episodes * steps, rate: zeta };
-    const imitator = network(wasm, all, generator(seed));
-    const input = (state, action, theta) => [...state, ...action, ...(withTheta ? theta : [])];
-    return ({ here: { state, theta }, action, solution, next }) => {
-      imitator.remember(input(state, action, theta), solution.value);
-      if (!imitator.ready()) return { value: null, warm: solution };
-      imitator.fit();
-      return { value: imitator.predict(input(next, solution.nextAction, theta)), warm: solution };
-    };
-  };
-
-  // ---- The learners: a rule takes { theta, w }, delta, the solution in s and what is known of s+
-
-  const semiGradient = ({ rules }, { alpha }) => ({ theta, w }, delta, { features }) => ({
-    theta: rules.semiGradient(theta, delta, features, alpha), w,
-  });
-
-  const gradientTd = ({ rules, problem }, { alpha, beta }) => ({ theta, w }, delta, solution, successor) => ({
-    theta: rules.gradientTd(
-      theta, w, delta, solution.features, successor.features, alpha, problem.discount[1],
-    ),
-    w: rules.auxiliary(w, delta, solution.features, beta),
-  });
-
-  function exactGradientTd(nmpc, settings) {
-    const printed = gradientTd(nmpc, settings), { rules } = nmpc, { alpha, thetaSet } = settings;
-    return (weights, delta, solution, successor, given) => {
-      const { theta, w } = printed(weights, delta, solution, successor);
-      const product = nmpc.hessianTimes(given, solution, weights.w);
-      if (!product) return null; // no strict minimum: Python then uses dense algebra
-      const h = rules.curvature(delta, solution.features, weights.w, product);
-      return { theta: rules.project(theta.map((each, k) => each - alpha * h[k]), ...thetaSet), w };
-    };
-  }
-
+  const [SEMI_GRADIENT, GRADIENT_TD, EXACT] = [0, 1, 2]; // how theta moves
+  const [NOTHING, SECOND_SOLVE, NETWORK] = [0, 1, 2]; // what values the next state
   const LEARNERS = {
-    ES: { rule: semiGradient },
-    DES: { rule: semiGradient, bootstrap: imitation(false) },
-    RDES: { rule: semiGradient, bootstrap: imitation(true) },
-    GES: { rule: gradientTd },
-    TDC: { rule: exactGradientTd },
-    QL: { rule: semiGradient, constrained: true },
-    frozen: { rule: null }, // values no successor
+    ES: { rule: SEMI_GRADIENT, bootstrap: SECOND_SOLVE },
+    DES: { rule: SEMI_GRADIENT, bootstrap: NETWORK },
+    RDES: { rule: SEMI_GRADIENT, bootstrap: NETWORK, withTheta: true },
+    GES: { rule: GRADIENT_TD, bootstrap: SECOND_SOLVE },
+    TDC: { rule: EXACT, bootstrap: SECOND_SOLVE },
+    QL: { rule: SEMI_GRADIENT, bootstrap: SECOND_SOLVE, constrained: true },
+    frozen: { rule: SEMI_GRADIENT, bootstrap: NOTHING },
   };
+  // What a row begins with; state, action, features, theta and w follow.
+  const NUMBERS = ["cost", "value", "nextValue", "delta", "loss", "restarts", "violation", "iterations", "solves"];
 
-  // ---- Exploration
+  const begins = new WeakMap(); // where the arrays of a module's run lie
 
-  const COUNTS = { step: (episode, t, steps) => episode * steps + t, episode: (episode) => episode };
-
-  // Noise that decays is added to the policy, and what leaves the action space is clipped.
-  function explorer({ problem: { lower, upper } }, { decay, decayRate, steps }, noise) {
-    const m = lower.length, count = COUNTS[decay];
-    return (policy, episode, t) => {
-      const scale = decayRate ** count(episode, t, steps), at = (episode * steps + t) * m;
-      return policy.map((u, i) => Math.min(Math.max(u + scale * noise[at + i], lower[i]), upper[i]));
+  // The run of a learner in the memory of `nmpc`, where it replaces the run before it.
+  function runIn(nmpc, settings) {
+    const { wasm, problem } = nmpc, { theta: first, w: firstW, limits, target, discs, horizon } = settings;
+    const { rule, bootstrap, withTheta = false, constrained = false } = LEARNERS[settings.learner];
+    if (begins.has(wasm)) wasm.release(begins.get(wasm));
+    begins.set(wasm, wasm.reserve(0));
+    const filled = (Kind, numbers) => {
+      const room = new Kind(wasm.memory.buffer, wasm.reserve(numbers.length * Kind.BYTES_PER_ELEMENT), numbers.length);
+      room.set(numbers);
+      return room;
     };
+    const numbers = (values) => filled(Float64Array, values), zeros = (length) => numbers(new Float64Array(length));
+    const n = settings.start.length, m = problem.lower.length, d = first.length;
+    const [least, most] = rule === EXACT ? settings.thetaSet : [-Infinity, Infinity];
+    const how = numbers([
+      rule, settings.alpha, settings.beta, bootstrap, withTheta, constrained, problem.tolerance, limits.far,
+      limits.absurd, ...first.map(() => least), ...first.map(() => most),
+    ]);
+    const none = zeros(4).byteOffset; // of a learner without a network
+    const net = bootstrap !== NETWORK ? [...Array(6).fill(none), 0, none, 0, 0] : self.nmpcrl.network(filled, {
+      ...settings.network, inputs: n + m + (withTheta ? d : 0), rate: settings.zeta,
+      capacity: settings.episodes * settings.steps,
+    }, self.nmpcrl.generator(settings.seed));
+    const given = { target, discs, horizon }, problemAt = () => nmpc.at(given);
+    problemAt();
+    const state = zeros(n), theta = numbers(first), w = numbers(firstW), warm = zeros(nmpc.planLength());
+    const noise = zeros(m), row = zeros(NUMBERS.length + n + m + 3 * d);
+    const [learner, ...places] = [how, state, theta, w, warm].map(({ byteOffset }) => byteOffset);
+
+    // The next step, the first of an episode in the state that it begins in: what the row holds, or { failed: true }.
+    function step(begin, scaled) {
+      if (begin) state.set(begin);
+      noise.set(scaled);
+      const last = [noise.byteOffset, row.byteOffset];
+      const made = wasm.learn(problemAt(), learner, ...net, ...places, begin ? 1 : 0, ...last);
+      const found = Object.fromEntries(NUMBERS.map((name, k) => [name, made ? row[k] : NaN]));
+      let at = NUMBERS.length;
+      const part = (length) => Array.from(row.subarray(at, at += length));
+      if (!made) {
+        const parts = { state: Array.from(state), action: null, features: null };
+        return { ...found, ...parts, theta: Array.from(theta), w: Array.from(w), failed: true };
+      }
+      return { ...found, state: part(n), action: part(m), features: part(d), theta: part(d), w: part(d), failed: false };
+    }
+    return step;
   }
 
   // ---- Training
 
-  const squared = (vector) => vector.reduce((sum, each) => sum + each * each, 0);
+  const COUNTS = { step: (episode, t, steps) => episode * steps + t, episode: (episode) => episode };
+  const squared = (vector) => vector?.reduce((sum, each) => sum + each * each, 0);
   const absurd = ({ theta, w }, limits) => ![...theta, ...w].every((each) => Math.abs(each) <= limits.absurd);
-
-  function learnerOf(nmpc, settings) {
-    const { rule, bootstrap = secondSolve, constrained = false } = LEARNERS[settings.learner];
-    return { move: rule?.(nmpc, settings), valued: bootstrap(nmpc, settings), constrained };
-  }
-
-  // The steps of one episode; the last one says so if a solve failed.
-  function* steps(nmpc, settings, { move, valued, constrained }, explore, episode, weights) {
-    const gamma = nmpc.problem.discount[1];
-    const given = { discs: settings.discs, target: settings.target, horizon: settings.horizon };
-    let state = settings.start, warm = null;
-    for (let time = 0; time < settings.steps; time++) {
-      const here = { ...given, state, theta: weights.theta };
-      const step = {
-        episode, time, state, ...weights,
-        action: null, cost: NaN, value: NaN, features: null, nextValue: NaN, delta: NaN, phi2: NaN,
-      };
-      const plan = nmpc.solve(here, { warm });
-      if (!plan) return yield { ...step, failed: true };
-      step.action = explore(plan.action, episode, time);
-      step.cost = nmpc.cost(given, state, step.action);
-      state = nmpc.step(state, step.action);
-      const solution = constrained ? nmpc.solve(here, { warm: plan, action: step.action }) : plan;
-      if (!solution) return yield { ...step, failed: true };
-      step.value = solution.value;
-      step.features = solution.features;
-      step.phi2 = squared(solution.features);
-      warm = solution;
-      if (move) {
-        const successor = valued({ here, action: step.action, solution, next: state });
-        if (!successor) return yield { ...step, failed: true };
-        ({ warm } = successor);
-        if (successor.value !== null) {
-          step.nextValue = successor.value;
-          step.delta = nmpc.rules.tdError(step.cost, gamma, solution.value, successor.value);
-          const moved = move(weights, step.delta, solution, successor, here);
-          if (!moved) return yield { ...step, failed: true };
-          weights = moved;
-        }
-      }
-      yield { ...step, ...weights, failed: false };
-    }
-  }
 
   // Algorithm 1, step by step: { episode, time, state, action, cost, value, features, nextValue, delta, phi2, theta,
   // w, failed, diverged }, theta and w after the step. What is diverged is the last.
   function* train(nmpc, settings, noise) {
-    const explore = explorer(nmpc, settings, noise), learner = learnerOf(nmpc, settings), { limits } = settings;
-    let weights = { theta: settings.theta, w: settings.w }, failures = 0;
+    const { limits, steps, decayRate, start } = settings, m = nmpc.problem.lower.length;
+    const step = runIn(nmpc, settings), count = COUNTS[settings.decay];
+    let failures = 0;
     for (let episode = 0; episode < settings.episodes; episode++) {
       let failed = false;
-      for (const step of steps(nmpc, settings, learner, explore, episode, weights)) {
-        ({ failed } = step);
-        weights = { theta: step.theta, w: step.w };
-        const diverged = absurd(weights, limits) || (failed && failures + 1 === limits.patience);
-        yield { ...step, diverged };
+      for (let time = 0; time < steps && !failed; time++) {
+        const scale = decayRate ** count(episode, time, steps), at = (episode * steps + time) * m;
+        const found = step(time ? null : start, noise.slice(at, at + m).map((each) => scale * each));
+        ({ failed } = found);
+        const diverged = absurd(found, limits) || (failed && failures + 1 === limits.patience);
+        yield { episode, time, ...found, phi2: squared(found.features), diverged };
         if (diverged) return;
       }
       failures = failed ? failures + 1 : 0;

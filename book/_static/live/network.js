@@ -1,5 +1,5 @@
-// The network that imitates the NMPC's value, as nmpcrl/learning/network.py has it: torch's first weights, and the
-// functions of nmpcrl/learning/network_entries.py for everything else.
+// The network that imitates the NMPC's value, as nmpcrl/learning/network.py begins it: torch's first weights, and
+// arrays in a module's memory.
 (function imitating() {
   "use strict";
 
@@ -52,50 +52,20 @@
 
   // ---- The network of a run
 
-  const begins = new WeakMap(); // where the network of a module lies
-
-  // Learns in place, in the memory of `wasm`, where it replaces the network before it. `hidden` neurons in each of two
-  // layers, `batch` examples a fit, `capacity` examples in all; `generator` draws the seeds of weights and mini-batches.
-  function network(wasm, { inputs, hidden, batch, capacity, rate }, generator) {
-    if (begins.has(wasm)) wasm.release(begins.get(wasm));
-    begins.set(wasm, wasm.reserve(0));
-    const room = (Kind, count) => (
-      new Kind(wasm.memory.buffer, wasm.reserve(count * Kind.BYTES_PER_ELEMENT), count)
-    );
-    const filled = (Kind, numbers) => {
-      const array = room(Kind, numbers.length);
-      array.set(numbers);
-      return array;
-    };
-    const first = firstWeights([inputs, hidden, hidden, 1], generator.integer63()), count = first.length;
-    const weights = filled(Float32Array, new Float32Array(4 * count)); // gradient and moments, too
+  // The arguments that `learn` takes of a network. `filled` puts numbers in the memory of a module. `hidden` neurons
+  // in each of two layers, `batch` examples a fit, `capacity` examples in all; `generator` draws the seeds of weights
+  // and mini-batches.
+  function network(filled, { inputs, hidden, batch, capacity, rate }, generator) {
+    const first = firstWeights([inputs, hidden, hidden, 1], generator.integer63());
+    const weights = filled(Float32Array, new Float32Array(4 * first.length)); // gradient and moments, too
     weights.set(first);
-    const examples = room(Float32Array, capacity * (inputs + 1)), order = room(Int32Array, capacity);
+    const examples = filled(Float32Array, new Float32Array(capacity * (inputs + 1)));
+    const order = filled(Int32Array, new Int32Array(capacity));
     const counts = filled(BigInt64Array, [0n, 0n]), draw = filled(BigUint64Array, [generator.integer63()]);
     const scales = filled(Float64Array, new Float64Array(inputs + 1).fill(1));
     const sizes = filled(BigInt64Array, [hidden, batch, capacity, 0].map(BigInt)); // 0: ReLU
-    const row = room(Float64Array, inputs);
     const arrays = [weights, examples, order, counts, draw, scales].map(({ byteOffset }) => byteOffset);
-    const net = [...arrays, rate, sizes.byteOffset, inputs, capacity];
-
-    function remember(input, target) {
-      row.set(input);
-      wasm.network_remember(...net, row.byteOffset, target);
-    }
-
-    function predict(input) {
-      row.set(input);
-      return wasm.network_predict(...net, row.byteOffset);
-    }
-
-    // `fit` makes one Adam step on a mini-batch, and returns its loss before the step.
-    return {
-      weights: weights.subarray(0, count), // now
-      ready: () => counts[0] >= batch,
-      fit: () => wasm.network_fit(...net),
-      remember,
-      predict,
-    };
+    return [...arrays, rate, sizes.byteOffset, inputs, capacity];
   }
 
   self.nmpcrl = {

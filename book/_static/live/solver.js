@@ -7,7 +7,7 @@
 
   const FREE = 0, FIXED = 1; // u_0
   const NOTHING = -1; // no earlier solution
-  const SOLVED = 0, FORMED = 1;
+  const SOLVED = 0;
 
   // The bytes that were packed: gzip, then base64.
   async function unpack(packed) {
@@ -52,7 +52,6 @@
 
     const numbers = room(packed(problem, largest).length);
     const state = room(n), next = room(n), theta = room(d), action = room(m), report = room(5);
-    const vector = room(d), product = room(d);
     let known = null, N = 0, slacks = 0; // of what was asked last
     const hard = problem.fixed - problem.soft;
     const size = (fixed) => (N + 1) * (3 * (n + slacks) + hard) + 2 * N * m + fixed * m + d; // of a plan's numbers
@@ -74,7 +73,7 @@
     }
 
     ask({ data: largest });
-    const plan = room(size(FIXED)), noStates = room((N + 1) * n), noInputs = room(N * m);
+    const plan = room(size(FIXED));
     const places = (...arrays) => arrays.map(({ byteOffset }) => byteOffset);
     const asked = places(numbers, state, theta, action);
 
@@ -132,16 +131,6 @@
       return chargeThere();
     }
 
-    // The Hessian of a plan's value in theta, times a vector; null at no strict minimum.
-    function hessianTimes(given, solution, by) {
-      ask(given);
-      action.set(over(solution.action, inputUnits));
-      plan.set(solution.numbers);
-      vector.set(by);
-      const formed = wasm.nmpc_slopes(...asked, solution.fixed, ...places(plan, vector, noStates, noInputs, product));
-      return formed === FORMED ? Array.from(product) : null;
-    }
-
     // The closed loop of a task's policy from `given.start` without noise, its cost, discounted too, and the first of
     // its plans. A failed solve ends it, as in `evaluate`.
     function rollout(given, steps) {
@@ -161,30 +150,34 @@
       return found;
     }
 
-    return { problem, wasm, solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room, d) };
+    // Where the problem of `given` lies, and how long a plan's numbers are without the gradient.
+    function at(given) {
+      ask(given);
+      return numbers.byteOffset;
+    }
+    const planLength = () => size(FREE) - d;
+
+    return { problem, wasm, solve, rollout, step, cost, at, planLength, rules: rules(wasm, room, d) };
   }
 
-  // The update rules, as nmpcrl/learning/rules.py describes them: vectors in, vectors out, no longer than theta.
+  // The update rules, as nmpcrl/learning/browser.py describes them, of vectors no longer than theta.
   function rules(wasm, room, longest) {
-    const given = Array.from({ length: 4 }, () => room(longest)), out = room(longest);
-    const rule = (name) => (...values) => {
-      let vectors = 0, d = 0;
-      const placed = values.map((value) => {
-        if (typeof value === "number") return value;
-        d = value.length;
-        given[vectors].set(value);
-        return given[vectors++].byteOffset;
-      });
-      name(d, ...placed, out.byteOffset);
-      return Array.from(out.subarray(0, d));
-    };
+    const SEMI_GRADIENT = 0, GRADIENT_TD = 1; // as in loop.py
+    const places = Array.from({ length: 4 }, () => room(longest));
+
+    // { theta, w } after a step.
+    function moved(rule, { theta, w, delta, phi, phiNext, alpha, beta, gamma }) {
+      [theta, w, phi, phiNext].forEach((vector, k) => places[k].set(vector));
+      const [atTheta, atW, ...others] = places.map(({ byteOffset }) => byteOffset);
+      wasm.moved(rule, theta.length, atTheta, atW, delta, ...others, alpha, beta, gamma);
+      return { theta: Array.from(places[0].subarray(0, theta.length)), w: Array.from(places[1].subarray(0, w.length)) };
+    }
     return {
-      tdError: wasm.rule_td_error, // (cost, gamma, q, qNext)
-      semiGradient: rule(wasm.rule_semi_gradient), // (theta, delta, phi, alpha)
-      gradientTd: rule(wasm.rule_gradient_td), // (theta, w, delta, phi, phiNext, alpha, gamma)
-      auxiliary: rule(wasm.rule_auxiliary), // (w, delta, phi, beta)
-      curvature: rule(wasm.rule_curvature), // (delta, phi, w, hessianW)
-      project: rule(wasm.rule_project), // (theta, least, most)
+      tdError: wasm.td_error, // (cost, gamma, q, qNext)
+      semiGradient: (theta, delta, phi, alpha) => (
+        moved(SEMI_GRADIENT, { theta, w: theta, delta, phi, phiNext: phi, alpha, beta: 0, gamma: 0 }).theta
+      ),
+      gradientTd: (given) => moved(GRADIENT_TD, given),
     };
   }
 

@@ -2,7 +2,7 @@
 
 from typing import TypedDict
 
-from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.control.nmpc import ABSURD, FAR
 from nmpcrl.learning.training import PATIENCE
 from nmpcrl.study import paper
 
@@ -11,6 +11,7 @@ class Limits(TypedDict):
     """When a run is a divergence."""
 
     absurd: float  # the largest size of a component of theta or w
+    far: float  # that of a state
     patience: int  # so many episodes in a row that a failed solve ended
 
 
@@ -31,6 +32,6 @@ class Fixed(TypedDict):
 def fixed() -> Fixed:
     """The library's own numbers."""
     return {
-        "limits": {"absurd": ABSURD, "patience": PATIENCE},
+        "limits": {"absurd": ABSURD, "far": FAR, "patience": PATIENCE},
         "network": {"hidden": paper.HIDDEN, "batch": paper.BATCH},
     }
