@@ -89,22 +89,9 @@ class RecordingNetwork:
         return np.array(self.answer)
 
 
-@pytest.fixture
-def controller() -> LinearController:
-    """A linear value function with gamma = 0.9."""
-    return LinearController()
-
-
-@pytest.fixture
-def quadratic() -> QuadraticController:
-    """A value function that is quadratic in theta, with gamma = 0.9."""
-    return QuadraticController()
-
-
-@pytest.fixture
-def network() -> RecordingNetwork:
-    """A network that is ready after three examples and always answers 7."""
-    return RecordingNetwork()
+controller = pytest.fixture(lambda: LinearController(), name="controller")
+quadratic = pytest.fixture(lambda: QuadraticController(), name="quadratic")
+network = pytest.fixture(lambda: RecordingNetwork(), name="network")
 
 
 @pytest.fixture

@@ -105,17 +105,18 @@ def narrowed(bound, dtype):
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("make", "options", "message"),
     [
-        (lambda: gymnasium.make("Pendulum-v1"), "observation_space = .* must be a Box of 2 numb"),
-        (lambda: gymnasium.make("MountainCar-v0"), r"action_space = Discrete\(3\) must be a Box"),
-        (lambda: narrowed(0.5, np.float32), r"between \[-0.5\] and \[0.5\], .* \[-1.\] and \[1.\]"),
-        (lambda: narrowed(9, int), "action_space = .*int.* must hold floats"),
+        (lambda: gymnasium.make("Pendulum-v1"), {}, "observation_space = .* must be a Box of 2 nu"),
+        (lambda: gymnasium.make("MountainCar-v0"), {}, r"= Discrete\(3\) must be a Box"),
+        (lambda: narrowed(0.5, np.float32), {}, r"between \[-0.5\] and \[0.5\], .* \[-1.\] and"),
+        (lambda: narrowed(9, int), {}, "action_space = .*int.* must hold floats"),
+        (Slow, {"start": [0.0, 0.0]}, "draws its own start: leave start= out"),
     ],
 )
-def test_an_environment_of_another_kind_is_refused(car, make, message):
+def test_an_environment_of_another_kind_is_refused(car, make, options, message):
     with pytest.raises(ValueError, match=message):
-        evaluate(car, car.problem.theta, 5, plant=make())
+        evaluate(car, car.problem.theta, 5, plant=make(), **options)
 
 
 def test_a_plant_that_runs_away_is_an_error_of_the_environment(car):
@@ -123,11 +124,6 @@ def test_a_plant_that_runs_away_is_an_error_of_the_environment(car):
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"plant returned .nan nan.; a state is 2 finite numbers"):
         env.step(np.zeros(1))
-
-
-def test_an_environment_has_a_start_of_its_own(car):
-    with pytest.raises(ValueError, match="draws its own start: leave start= out"):
-        evaluate(car, car.problem.theta, 5, plant=Slow(), start=[0.0, 0.0])
 
 
 @pytest.mark.filterwarnings("ignore:.*Box observation space:UserWarning")
