@@ -80,10 +80,10 @@ class Variant:
 
     def feedback(self, solution: Solution) -> Matrix:
         """As `Nmpc.policy_feedback`."""
-        slopes = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
-        if self._units is None:
-            return slopes
-        return self._units.inputs[:, None] * slopes / self._units.states
+        slopes: Matrix = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
+        if self._units is not None:
+            slopes = self._units.inputs[:, None] * slopes / self._units.states
+        return slopes
 
     def _rows(self, solution: Solution, stage: int, part: Indices) -> Matrix:
         """The gradients of the plan's entries at a stage, a sweep each."""
