@@ -11,17 +11,10 @@ from nmpcrl.control import Hard, Parameter, Problem, Series, Soft
 def pendulum(**changes: Any) -> Problem:
     """A curved plant with everything that a problem may have; each symbol is learned."""
     fields = {
-        "states": 2,
-        "inputs": 1,
-        "horizon": 6,
-        "gamma": 0.95,
+        "states": 2, "inputs": 1, "horizon": 6, "gamma": 0.95, "lower": -1.5, "upper": 1.5,
         "theta": {
-            "rate": 1.3,
-            "damping": Parameter(0.2, 0.0, 2.0),
-            "Q": np.diag([1.0, 0.3]),
-            "r": 0.2,
-            "limit": np.array([0.7, 0.9]),
-            "offset": 0.5,
+            "rate": 1.3, "damping": Parameter(0.2, 0.0, 2.0), "Q": np.diag([1.0, 0.3]), "r": 0.2,
+            "limit": np.array([0.7, 0.9]), "offset": 0.5,
         },
         "model": lambda x, u, th, d: ca.vertcat(
             x[0] + 0.2 * x[1],
@@ -37,10 +30,8 @@ def pendulum(**changes: Any) -> Problem:
             Soft(lambda x, u, th, d: x[1] * u - th["limit"][1] * ca.cos(x[0]), weight=2.0),
             Soft(lambda x, u, th, d: [x[0] - 1.2, -x[0] - 1.2], weight=[3.0, 5.0], stages=[-1]),
         ],
-        "lower": -1.5,
-        "upper": 1.5,
         "data": {"wind": 0.0, "target": np.zeros(2)},
-    }
+    }  # fmt: skip
     return Problem(**fields | changes)
 
 
@@ -91,10 +82,7 @@ def drawn(seed: int) -> Problem:
         return c @ ca.sin(x) + e @ (th["h"] * u) - th["limit"] + d["shift"]
 
     return Problem(
-        states=int(n),
-        inputs=int(m),
-        horizon=int(horizon),
-        gamma=float(rng.uniform(0.8, 1)),
+        states=int(n), inputs=int(m), horizon=int(horizon), gamma=float(rng.uniform(0.8, 1)),
         theta={
             "A": np.eye(n) + 0.1 * rng.normal(size=(n, n)), "B": rng.normal(size=(n, m)),
             "bend": 0.1 * rng.normal(), "root": rng.uniform(0.3, 1.5, n), "h": 0.5, "limit": 0.5,
@@ -103,7 +91,5 @@ def drawn(seed: int) -> Problem:
         stage=lambda x, u, th, d: ca.sumsqr(th["root"] * (x - d["shift"])) + 0.3 * ca.sumsqr(u),
         terminal=lambda x, th, d: 2 * ca.sumsqr(x) + th["h"] * ca.sum1(x**4),
         soft=[Soft(soft, weight=3.0)] if rows else (),
-        lower=-1.0,
-        upper=1.0,
-        data={"shift": Series(rng.normal(scale=0.3, size=horizon + 1))},
+        lower=-1.0, upper=1.0, data={"shift": Series(rng.normal(scale=0.3, size=horizon + 1))},
     )  # fmt: skip

@@ -23,17 +23,14 @@ pytestmark = pytest.mark.usefixtures("interpreted")
 @pytest.fixture(scope="module", params=[1, 6])
 def linear(request) -> Problem:
     return Problem(
-        states=2,
-        inputs=2,
-        horizon=request.param,
-        gamma=GAMMA,
+        states=2, inputs=2, horizon=request.param, gamma=GAMMA,
         theta={"A": A, "B": B, "Q": Q, "R": R, "b": np.array([0.02, -0.01]), "V0": 0.3},
         model=lambda x, u, th: th["A"] @ x + th["B"] @ u + th["b"],
         stage=lambda x, u, th: ca.bilin(th["Q"], x, x) + ca.bilin(th["R"], u, u),
         terminal=lambda x, th: ca.bilin(th["Q"], x, x),
         initial=lambda x, th: th["V0"],
         soft=[Soft(lambda x, u, th: x - 50.0)],  # which is never reached
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module", params=SOLVERS)

@@ -28,17 +28,12 @@ def drift(x: Any, u: Any, th: Any) -> Any:
 def point(**changes: Any) -> Problem:
     """A point that is pushed about a plane, with drag: (x, y, its velocity)."""
     fields = {
-        "states": 4,
-        "inputs": 2,
-        "horizon": N,
-        "gamma": GAMMA,
+        "states": 4, "inputs": 2, "horizon": N, "gamma": GAMMA, "lower": -3.0, "upper": 3.0,
         "theta": {"drag": 0.3, "r": 0.05, "limit": 0.0},
         "model": drift,
         "stage": lambda x, u, th: ca.sumsqr(x[:2] - 1) + th["r"] * ca.sumsqr(u),
         "terminal": lambda x, th: 4 * ca.sumsqr(x[:2] - 1) + ca.sumsqr(x[2:4]),
-        "lower": -3.0,
-        "upper": 3.0,
-    }
+    }  # fmt: skip
     return Problem(**fields | changes)
 
 

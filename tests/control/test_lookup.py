@@ -39,16 +39,11 @@ def test_the_last_piece_of_a_line_goes_on():
 def heater(table, **parameters) -> Problem:
     """A temperature whose losses stand in a table."""
     return Problem(
-        states=1,
-        inputs=1,
-        horizon=6,
-        theta={"gain": 0.8, **parameters},
+        states=1, inputs=1, horizon=6, theta={"gain": 0.8, **parameters}, lower=-1.0, upper=5.0,
         model=lambda x, u, th: x + 0.2 * (th["gain"] * u - table(x, th)),
         stage=lambda x, u, th: (x - 2) ** 2 + 0.1 * u**2,
         terminal=lambda x, th: 4 * (x - 2) ** 2,
-        lower=-1.0,
-        upper=5.0,
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.usefixtures("interpreted")
