@@ -103,7 +103,7 @@ def tie() -> Example:
         sentence,
         numbers,
         experiment,
-        look="Look at the two robots: both pass, and one that starts a little aside is cheaper.",
+        look="Look at the two robots: both pass, and the one that starts aside at a lower cost.",
         against=replace(experiment, start=(x, y + ASIDE, heading)),
         learned=False,
     )

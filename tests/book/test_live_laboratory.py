@@ -499,7 +499,7 @@ def test_the_find_about_a_gap_shows_that_it_closes(tab):
 
 
 @pytest.mark.weekly
-def test_the_find_about_a_tie_lays_the_cheaper_run_over_the_one_between_two_plans(tab):
+def test_the_find_about_a_tie_lays_the_run_of_lower_cost_over_the_one_between_two_plans(tab):
     tab.click("A tie")
     tab.page.wait_for_function("() => document.querySelector('figure.live').shown.over")
     shown = tab.shown()

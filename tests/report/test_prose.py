@@ -160,7 +160,7 @@ def test_a_class_is_shown_with_its_decorator():
 
 
 def test_what_only_exists_compiled_and_a_constant_are_shown_by_name():
-    assert "\n@inlined\ndef centre(h, " in listing("nmpcrl.control.solvers.kernel:centre")
+    assert "\n@inlined\ndef centre(task, " in listing("nmpcrl.control.solvers.kernel:centre")
     assert "\nLAYOUTS = (" in listing("nmpcrl.study.design:LAYOUTS")
 
 

@@ -5,6 +5,8 @@ bound that the stage cost penalises. All parameters of the plan are learned, fro
 and without the mean of e.
 """
 
+from typing import Any
+
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
@@ -31,7 +33,7 @@ def problem(*, informed: bool = False) -> Problem:
     discounted, and the slacks are one stage late, as in mpcrl. P solves Riccati's equation of the
     wrong model. An `informed` theta begins at the plant's A, B, bounds and mean disturbance.
     """
-    late = {"weight": PENALTY / 2 / GAMMA, "stages": slice(1, None)}
+    late: dict[str, Any] = {"weight": PENALTY / 2 / GAMMA, "stages": slice(1, None)}
     mean = np.array([np.mean(DISTURBANCE), 0.0])
     return Problem(
         states=2,
