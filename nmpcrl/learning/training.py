@@ -55,7 +55,7 @@ class Step:
 
     @property
     def solves(self) -> list[Solution]:
-        """The different ones: of the plan, of Q(s, a) and of the next state."""
+        """Solutions of the plan, of Q(s, a) and of the next state, each once."""
         successor = self.update and self.update.successor
         solutions = self.plan, self.solution, successor and successor.solution
         return list(dict.fromkeys(filter(None, solutions)))
