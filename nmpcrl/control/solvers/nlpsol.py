@@ -3,28 +3,28 @@
 A `Problem` is solved in units in which no slack costs more than `HIGHEST_PRICE`, no curvature of
 the cost is below 1 and rows are of size 1, for tolerances are absolute. Its cold starts lie a
 little off rest, where symmetry may make a maximum stationary. A solve that fails begins again, with
-Ipopt as well, and where the model grows from the plan of a `Regulator`. One that ends at no strict
-minimum is compared with solves from elsewhere: see `Solution.restarts` and `Solution.solver`.
+Ipopt as well. One that ends at no strict minimum is compared with solves from elsewhere: see
+`Solution.restarts` and `Solution.solver`.
 """
 
 import time
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.diagnosis import FARTHEST, FASTEST
+from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import NoStartLeft, Solution, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
-from nmpcrl.control.solvers.starts import Regulator, random_inputs
+from nmpcrl.control.solvers.starts import random_inputs
 
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
@@ -164,7 +164,7 @@ class Program:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         p = np.concatenate([state, theta, *action, data.ravel()])
         failed: list[str] = []
-        for solver, start, point in self._starts(warm_start, state, theta, data, *action):
+        for solver, start, point in self._starts(warm_start, state):
             found = self._attempt(solver, start, point, p)
             if isinstance(found, Found):
                 break
@@ -190,19 +190,15 @@ class Program:
         )
 
     def _starts(
-        self, warm_start: Solution | None, state: Vector, *given: Any
+        self, warm_start: Solution | None, state: Vector
     ) -> Iterator[tuple[Nlpsol, Start, PrimalDual]]:
-        """The warm start, and of a `Problem` cold ones, each by others as well."""
+        """The warm start, and then a cold one, by others as well."""
         if warm_start is not None:
             same = np.array_equal(warm_start.state, state)
             start = Start.SAME if same else Start.SHIFTED
             yield self._solver, start, self._from(warm_start, state, same=same)
-        yield self._solver, Start.COLD, self._standing(state)
-        for other in self._solver.others:
-            yield other, Start.COLD, self._standing(state)
-        for point in self._regulated(state, *given):
-            for solver in (self._solver, *self._solver.others):
-                yield solver, Start.COLD, point
+        for solver in (self._solver, *self._solver.others):
+            yield solver, Start.COLD, self._standing(state)
 
     def _attempt(self, solver: Nlpsol, start: Start, point: PrimalDual, p: Vector) -> Found | str:
         """An optimum, or why there is none."""
@@ -273,28 +269,6 @@ class Program:
         rest = np.clip(0.0, problem.lower, problem.upper)
         z[ocp.inputs] = rest + share * (random_inputs(problem, seed, len(ocp.inputs)) - rest)
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
-
-    def _regulated(
-        self, state: Vector, theta: Vector, data: Matrix, *action: Vector
-    ) -> list[PrimalDual]:
-        """The plan that is held by feedback, if there is one.
-
-        A model too fast for its period has none, lest a plan of what is no dynamics be found.
-        """
-        slopes = self._regulator.slopes(state, theta, data)
-        if not np.isfinite(slopes).all() or np.abs(np.linalg.eigvals(slopes)).max() > FASTEST:
-            return []
-        inputs = self._regulator.inputs(state, theta, data, *action)
-        if inputs is None:
-            return []
-        z, lam, nu = self._standing(state)
-        z[self._ocp.states] = self._regulator.states(state, inputs, theta, data)
-        z[self._ocp.inputs] = inputs
-        return [(z, lam, nu)]
-
-    @cached_property
-    def _regulator(self) -> Regulator:
-        return Regulator(self._problem)
 
     def _from(self, warm_start: Solution, state: Vector, *, same: bool) -> PrimalDual:
         """The warm start itself if solved in the same state; else one stage later, its end twice.

@@ -154,12 +154,6 @@ def conditions(ocp: Ocp) -> ca.Function:
     return ca.Function("conditions", arguments, [ocp.objective, ocp.constraints, *slopes])
 
 
-def parameters(solution: Solution) -> np.ndarray:
-    """p = (s, theta[, a])."""
-    fixed = solution.action[: solution.ocp.fixed_action.size]
-    return np.concatenate([solution.state, solution.theta, fixed])
-
-
 def unit(theta: np.ndarray) -> float:
     """What the solver divides costs by, so that no weight exceeds 1."""
     return max(1.0, (theta**2).max())
@@ -189,7 +183,7 @@ def residual(solution: Solution) -> float:
     """
     scale, weight = unit(solution.theta), box_weight(solution)
     z, lam, nu = solution.primal, solution.constraint_duals, solution.bound_duals
-    parts = conditions(solution.ocp)(z, parameters(solution), lam)
+    parts = conditions(solution.ocp)(z, solution.parameters, lam)
     _, g, slope, _ = (part.full().ravel() for part in parts)
     equality = solution.ocp.equality
     beyond, multiplier, of_box = sides(solution)
@@ -257,7 +251,7 @@ def ipopts(solution: Solution, inputs: np.ndarray | float = 0.0) -> tuple[float,
     z[ocp.states], z[ocp.inputs] = solution.state, inputs
     weight = box_weight(solution) if solution.violation > 1e-6 else 1e4 * unit(solution.theta)
     start = np.append(z, np.zeros(bounds["lbx"].size - z.size))
-    found = solver(x0=start, p=np.append(parameters(solution), weight), **bounds)
+    found = solver(x0=start, p=np.append(solution.parameters, weight), **bounds)
     if not solver.stats()["success"]:
         return None
     return float(found["f"]), found["x"].full().ravel()[ocp.states]
@@ -273,7 +267,7 @@ def judged(nmpc: Nmpc, solution: Solution) -> None:
     assert (solution.inputs <= plant.upper).all()
     assert solution.violation == pytest.approx(beyond(solution).max(initial=0), abs=1e-9)
     assert residual(solution) <= KKT
-    arguments = solution.primal, parameters(solution), solution.constraint_duals
+    arguments = solution.primal, solution.parameters, solution.constraint_duals
     value, _, _, features = conditions(solution.ocp)(*arguments)
     assert solution.value == pytest.approx(float(value), rel=1e-9, abs=1e-12)
     scale = np.abs(features.full()).max(initial=1)

@@ -6,7 +6,6 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from nmpcrl.control import Nmpc, Obstacle, Problem, Riccati, Soft, Task, differential_drive
-from nmpcrl.control.solvers.riccati import SEVERAL
 from nmpcrl.control.solvers.starts import MOST, cold_inputs
 from nmpcrl.study import paper
 
@@ -14,7 +13,7 @@ THETA = np.array(paper.THETA_INIT)
 BEFORE = np.array([0.0, 0.0, 0.0])  # a wall stands between here and the target
 
 
-def before_a_wall(starts: int = SEVERAL) -> Nmpc:
+def before_a_wall(starts: int) -> Nmpc:
     """A robot that faces a wall of three obstacles."""
     task = Task(
         start=BEFORE,
@@ -31,11 +30,6 @@ def test_one_start_stands_before_a_wall_and_nine_drive_around_it():
     assert nine.value < 0.97 * one.value
     assert one.states[:, 0].max() < 1.8 < nine.states[:, 0].max()
     assert before_a_wall(9).kkt_residual(nine, relative=True) < 1e-6
-
-
-def test_several_starts_are_compared_unless_one_is_asked_for():
-    one, several = (nmpc.solve(BEFORE, THETA) for nmpc in (before_a_wall(1), before_a_wall()))
-    assert several.value < 0.97 * one.value
 
 
 def test_of_equal_plans_the_first_is_kept():
