@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -54,8 +54,13 @@ class Soft:
 class Hard:
     """Rows h <= 0; where no plan keeps to all of them, the plan is one that violates them least."""
 
+    each: ClassVar[str | None] = None
+
     row: Callable[..., Any]  # as of `Soft`
     stages: Any = None  # as of `Soft`
+
+
+Rows = dict[str, Soft | Hard]  # by their names in messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +169,8 @@ class Problem(Described):
             for side in ("lower", "upper")
         )  # fmt: skip
         self._refuse_outside()
-        soft, hard = _rows("soft", soft, Soft), _rows("hard", hard, Hard)
-        self.family = _family(soft, data or {})
+        rows = {**_rows("soft", soft, Soft), **_rows("hard", hard, Hard)}
+        self.family = _family(rows, data or {})
         defaults = {
             name: numbers(f"data {name}", one.values if isinstance(one, Series) else one,
                           empty=name == self.family)
@@ -177,15 +182,15 @@ class Problem(Described):
         }
         if self.family and len(shapes[self.family]) != 2:
             raise ValueError(f"data {self.family!r} must be a table: its rows are of each line")
-        self.lines, width = shapes.pop(self.family, (0, 0))
+        self.lines, width = shapes.pop(self.family, (0, 0)) if self.family else (0, 0)
         self.own_names = Blocks("data", shapes)
         self.line_names = Blocks("line", {self.family: (width,)} if self.family else {})
         table = {self.family: (self.lines, width)} if self.family else {}
         self.data_names = Blocks("data", shapes | table)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
         self.data = read_only(self.data_names.filled(empty, defaults))
-        self._function, sizes = self._written(model, stage, terminal, initial, soft, hard)
-        self.weights, self.active = self._spread(soft, hard, sizes)
+        self._function, sizes = self._written(model, stage, terminal, initial, rows)
+        self.weights, self.active = self._spread(rows, sizes)
         e = self.expressions
         self.on_inputs = self._every(*(_depends(rows, e.u) for rows in (e.fixed, e.each)))
         self.sizes = _sizes(scale, self)
@@ -193,9 +198,10 @@ class Problem(Described):
     @cached_property
     def expressions(self) -> Expressions:
         """The problem in symbols."""
-        *given, line = self._function.sx_in()
-        *costs, fixed, each = self._function.call([*given, line])
-        return Expressions(*given, *costs, fixed, line, each)
+        x, u, theta, d, line = given = self._function.sx_in()
+        next_x, *costs, fixed, each = self._function.call(given)
+        stage, terminal, initial = costs
+        return Expressions(x, u, theta, d, next_x, stage, terminal, initial, fixed, line, each)
 
     @property
     def soft(self) -> NDArray[np.bool_]:
@@ -317,8 +323,7 @@ class Problem(Described):
         stage: Callable[..., Any],
         terminal: Callable[..., Any] | None,
         initial: Callable[..., Any] | None,
-        soft: tuple[Soft, ...],
-        hard: tuple[Hard, ...],
+        given: Rows,
     ) -> tuple[ca.Function, list[int]]:
         """The problem as a function that can be pickled, and how many rows each `Soft` has."""
         x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
@@ -335,38 +340,34 @@ class Problem(Described):
         final = expression("terminal", terminal, *alone, 1, "cost")
         first = expression("initial", initial, *alone, 1, "cost")
         rows = [
-            expression(f"{kind}[{k}]", one.row, *(of_line if _each_of(one) else both), 0, "row")
-            for kind, given in (("soft", soft), ("hard", hard))
-            for k, one in enumerate(given)
+            expression(name, one.row, *(of_line if one.each else both), 0, "row")
+            for name, one in given.items()
         ]
         z = ca.vertcat(x, u)
-        for k, (one, row) in enumerate(zip((*soft, *hard), rows, strict=True)):
+        for name, row in zip(given, rows, strict=True):
             if not _depends(row, z).all():
-                kind, k = ("soft", k) if isinstance(one, Soft) else ("hard", k - len(soft))
                 raise ValueError(
-                    f"{kind}[{k}] has a row that depends on neither x nor u: no plan can change it"
+                    f"{name} has a row that depends on neither x nor u: no plan can change it"
                 )
-        lines = [bool(_each_of(one)) for one in (*soft, *hard)]
+        of_lines = [bool(one.each) for one in given.values()]
         fixed, each = (
-            ca.vertcat(ca.SX(0, 1), *(row for row, of in zip(rows, lines, strict=True) if of == it))
+            ca.vertcat(ca.SX(0, 1), *(rows[k] for k in range(len(rows)) if of_lines[k] == it))
             for it in (False, True)
         )
         results = [next_x, cost, final, first, fixed, each]
         function = ca.Function("problem", [x, u, theta, d, line], results)
         return function, [row.numel() for row in rows]
 
-    def _spread(
-        self, soft: tuple[Soft, ...], hard: tuple[Hard, ...], sizes: list[int]
-    ) -> tuple[Vector, NDArray[np.bool_]]:
+    def _spread(self, given: Rows, sizes: list[int]) -> tuple[Vector, NDArray[np.bool_]]:
         """W of every row, infinite where it is hard, and whether it holds at each stage."""
         stages = np.arange(self.horizon + 1)
         e = self.expressions
-        weights, active = ([np.zeros(0)], [np.zeros(0)]), ([], [])
+        weights: tuple[list[Vector], ...] = ([np.zeros(0)], [np.zeros(0)])
+        active: tuple[list[NDArray[np.bool_]], ...] = ([], [])
         u = {False: _depends(e.fixed, e.u), True: _depends(e.each, e.u)}
         begin = {False: 0, True: 0}
-        for k, (one, size) in enumerate(zip((*soft, *hard), sizes, strict=True)):
-            of_line = bool(_each_of(one))
-            name = f"soft[{k}]" if k < len(soft) else f"hard[{k - len(soft)}]"
+        for (name, one), size in zip(given.items(), sizes, strict=True):
+            of_line = bool(one.each)
             place = slice(begin[of_line], begin[of_line] + size)
             begin[of_line] += size
             chosen = _stages(name, one.stages, stages, bool(u[of_line][place].any()))
@@ -465,27 +466,25 @@ def _bounds(of: str, lower: Any, upper: Any, count: int) -> tuple[Vector, Vector
     return sides[0], sides[1]
 
 
-def _rows(name: str, given: Any, kind: Any) -> tuple[Any, ...]:
-    found = tuple(given) if isinstance(given, Iterable) else (given,)
-    for k, one in enumerate(found):
+def _rows(name: str, given: Any, kind: Any) -> Rows:
+    """Rows by their names in messages."""
+    several = given if isinstance(given, Iterable) else (given,)
+    found = {f"{name}[{k}]": one for k, one in enumerate(several)}
+    for place, one in found.items():
         if not isinstance(one, kind):
             example = "Soft(row, weight=10.0)" if kind is Soft else "Hard(row)"
             raise ValueError(
-                f"{name}[{k}] = {one!r} must be a {kind.__name__}: write {name}=[{example}]"
+                f"{place} = {one!r} must be a {kind.__name__}: write {name}=[{example}]"
             )
     return found
 
 
-def _each_of(row: Soft | Hard) -> str | None:
-    return row.each if isinstance(row, Soft) else None
-
-
-def _family(soft: tuple[Soft, ...], data: Mapping[str, Any]) -> str | None:
+def _family(rows: Rows, data: Mapping[str, Any]) -> str | None:
     """The data that `Soft.each` names."""
-    for k, one in enumerate(soft):
+    for name, one in rows.items():
         if one.each is not None and one.each not in data:
-            raise ValueError(f"soft[{k}].each = {one.each!r} must be the name of data")
-    names = {one.each for one in soft if one.each is not None}
+            raise ValueError(f"{name}.each = {one.each!r} must be the name of data")
+    names = {one.each for one in rows.values() if one.each is not None}
     if len(names) > 1:
         raise ValueError(f"only one of the data may have rows of its lines, not {sorted(names)}")
     return next(iter(names), None)

@@ -384,18 +384,20 @@ def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
 
 @pytest.mark.slow
 def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
-    same = 0
+    same = worse = 0
     for state, theta in draw(100, seed=40):
         solution = controllers["riccati"].solve(state, theta)
         assert solution.violation <= 1e-6
         ipopt = controllers["ipopt"].solve(state, theta)
         if solution.value != pytest.approx(ipopt.value, rel=1e-6):
             assert np.abs(solution.states - ipopt.states).max() > 1e-2
+            worse += solution.value > ipopt.value
             continue
         same += 1
         scale = np.abs(ipopt.features).max()
         np.testing.assert_allclose(solution.features, ipopt.features, atol=1e-5 * scale)
-    assert same >= 92
+    assert same >= 85  # of the others, several starts find lower minima than Ipopt's one
+    assert worse <= 2
 
 
 @pytest.mark.weekly
