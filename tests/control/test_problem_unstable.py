@@ -33,12 +33,12 @@ def pendulum(horizon: int, bound: float = 5.0) -> Problem:
     )
 
 
-def scalar(horizon: int = 3, model=None, stage=None, bound=np.inf, size=1.0) -> Problem:
+def scalar(horizon: int = 3, model=None, stage=None, bound=np.inf, size=1.0, a=1.5) -> Problem:
     return Problem(
         states=1,
         inputs=1,
         horizon=horizon,
-        theta={"a": 1.5, "size": size},
+        theta={"a": a, "size": size},
         model=model or (lambda x, u, th: th["a"] * x + u),
         stage=stage or (lambda x, u, th: x**2 + u**2),
         lower=-bound,
@@ -99,10 +99,6 @@ def among_moving_discs() -> Problem:
     )  # fmt: skip
 
 
-def linear(factor: float) -> Problem:
-    return scalar(40, model=lambda x, u, th: factor * x + u, bound=5.0)
-
-
 ANGLES = [(a, w) for a in (-0.4, -0.2, 0.05, 0.3) for w in (-0.3, 0.0, 0.3)]
 NEAR = [(p, a, 0.0, w) for p in (-0.5, 0.5) for a in (-0.3, 0.1) for w in (0.0, 0.5)]
 HANGING = [(p, np.pi + a, 0.0, w) for p in (-0.5, 0.0) for a in (-0.3, 0.01) for w in (0.0, 0.5)]
@@ -112,7 +108,7 @@ HELD = {
     **{f"pendulum {N}": (pendulum(N), ANGLES) for N in (1, 10, 30, 60, 100)},
     **{f"cart-pole near upright {N}": (cart_pole(N, False), NEAR) for N in (25, 60, 100)},
     **{f"cart-pole that swings up {N}": (cart_pole(N, True), HANGING) for N in (25, 60, 100)},
-    **{f"x+ = {a} x + u": (linear(a), LINE) for a in (1.1, 1.5, 2.0)},
+    **{f"x+ = {a} x + u": (scalar(40, bound=5.0, a=a), LINE) for a in (1.1, 1.5, 2.0)},
     "moving discs": (among_moving_discs(), FREE),
 }
 
