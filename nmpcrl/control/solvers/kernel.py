@@ -14,7 +14,8 @@ From a start, one solve repeats the following while the barrier parameter mu fal
 
 1. `measure` a plan: h, and for it the best sigma and s in closed form;
 2. `linearise`: from the last stage to the first, the costates p = L_x + A' p+ and the Hessian of
-   the Lagrangian, exact, with the curvature of the dynamics;
+   the Lagrangian with the curvature of the dynamics. Its costates are those that step 6 predicted
+   (`remember`), which p equals at a solution: p of an unstable model depends on its plan wildly;
 3. `residuals`: how far KKT is from holding; stop if hardly, let mu fall if little beside mu;
 4. `condense`: fold rows and bounds into the stages, one division each;
 5. `factorise`: the Riccati recursion. Where some Q_uu is not positive definite, delta I is added
@@ -753,10 +754,7 @@ def search(task, point, trial, mu, step, length, total, derivative):
 
 @inlined
 def remember(stages, step, before, length):
-    """Move the costates of the Hessian along the step, to those of its linear-quadratic problem.
-
-    The costates of a plan that is rolled out depend on it wildly where the model is unstable.
-    """
+    """Move the costates of the Hessian along the step, to those of its linear-quadratic problem."""
     for i in range(1, len(step.v)):
         for a in range(NX):
             after = step.v[i, a]

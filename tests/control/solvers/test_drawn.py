@@ -30,7 +30,7 @@ from nmpcrl.control.sensitivity import lagrangian
 from nmpcrl.control.solvers.starts import random_inputs
 
 ROBOT = differential_drive()
-KKT = 2e-8  # what is left of the conditions, each in its own unit: see `residual`
+KKT = 3e-8  # left of the conditions, each in its own unit: see `residual`; the solver allows 1e-8
 HARDEST = json.loads(Path(__file__).with_name("hardest.json").read_text())
 
 
