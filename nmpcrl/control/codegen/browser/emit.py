@@ -59,6 +59,7 @@ def emit(package: Package) -> bytes:
 
 def _parsed(ir: str) -> Any:
     ir = FOR_A_MACHINE.sub("", ir).replace(OVERFLOWING, "@product_of_sizes")
+    ir = ir.replace("alwaysinline", "inlinehint")  # a fifth smaller and 8 % slower: pages load it
     return llvm.parse_assembly(ir)
 
 
