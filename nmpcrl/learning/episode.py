@@ -9,7 +9,8 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Solution
-from nmpcrl.control.codegen.jit import CannotCompile, compiled, load
+from nmpcrl.control.codegen.jit import compiled, load
+from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.solvers import riccati
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.learning.baselines import nothing
@@ -116,7 +117,7 @@ def _episode(trainer: Trainer, loop: "Loop | None", number: int, weights: Weight
             solver = next(others, solver)
             if loop or absurd(weights, nmpc.largest):
                 break
-        if step.last or not loop:
+        if step.last or step.next_state is None:
             break
         state, warm = step.next_state, step.warm
     numbers, *parts = np.split(rows[:t], np.cumsum([len(NUMBERS), *sizes.values()])[:-1], axis=1)
@@ -160,6 +161,7 @@ class Loop:
         problem, given_action, place = machine.arguments, machine.arguments, 0
         if trainer.constrained:
             fixed = nmpc.machine(fix_action=True)
+            assert fixed is not None  # as `machine` is not
             given_action, place = fixed.arguments, fixed.place
         least, most = moves.projection or learner.bounds or (-np.inf, np.inf)
         d, rule = trainer.weights.theta.size, code.SEMI_GRADIENT

@@ -56,8 +56,9 @@ class Step:
     @property
     def solves(self) -> list[Solution]:
         """Solutions of the plan, of Q(s, a) and of the next state, each once."""
-        successor = self.update and self.update.successor
-        solutions = self.plan, self.solution, successor and successor.solution
+        solutions = [self.plan, self.solution]
+        if self.update and self.update.successor:
+            solutions.append(self.update.successor.solution)
         return list(dict.fromkeys(filter(None, solutions)))
 
     @property
