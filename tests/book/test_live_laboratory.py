@@ -167,7 +167,7 @@ def test_twenty_episodes_of_each_learner_are_those_of_python(tab):
     experiments = [
         Experiment(learner="ES", episodes=20),
         Experiment(learner="GES", decay="episode", decay_rate=0.97, episodes=20),
-        Experiment(learner="TDC", episodes=20),
+        Experiment(learner="TDC", seed=3, episodes=20),  # where every product can be formed
         Experiment(learner="QL", episodes=20),
     ]
     for one in experiments:
