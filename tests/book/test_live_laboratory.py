@@ -227,7 +227,7 @@ def test_a_layout_that_is_drawn_is_the_same_run_in_python(tab):
 
 
 def test_a_paste_into_a_terminal_trains_the_same_run(tab, tmp_path):
-    tab.press("Obstacle 4", "Shift+ArrowUp")
+    tab.press("Obstacle 4", "ArrowUp")
     fill(tab, Episodes=2, Seed=5)
     tab.click("Train")
     cost = trained(tab)[0]["rows"][-1]["judged"]["cost"]
