@@ -220,11 +220,14 @@ class Problem(Described):
 
     def rows(self, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
         """h and g of a stage, those of lines last, shape (M,); `data` are all of the stage."""
-        own, width = data[: self.own_size], self.expressions.line.numel()
-        *_, fixed, _ = self._function(x, u, theta, own, ca.DM.zeros(width))
-        lines = [data[self.own_size + j * width : self.own_size + (j + 1) * width]
-                 for j in range(self.lines)]  # fmt: skip
-        each = [self._function(x, u, theta, own, line)[-1] for line in lines]
+        return self._of_rows(self._function, x, u, theta, data)
+
+    def _of_rows(self, function: ca.Function, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
+        """The last results of a function, of fixed rows and of a line's, for all lines."""
+        own, width = data[: self.own_size], self.line_names.size
+        begins = range(self.own_size, self.own_size + self.lines * width, max(width, 1))
+        *_, fixed, _ = function(x, u, theta, own, ca.DM.zeros(width))
+        each = [function(x, u, theta, own, data[at : at + width])[-1] for at in begins]
         return ca.vertcat(ca.SX(0, 1), fixed, *each)
 
     def _every(self, fixed: Any, each: Any) -> NDArray[Any]:
@@ -260,11 +263,7 @@ class Problem(Described):
         e = self.expressions
         given = [e.x, e.u, e.theta, e.d, e.line]
         sizes = ca.Function("sizes", given, [self.row_sizes(e.fixed), self.row_sizes(e.each)])
-        own, width = data[: self.own_size], e.line.numel()
-        lines = [data[self.own_size + j * width : self.own_size + (j + 1) * width]
-                 for j in range(self.lines)]  # fmt: skip
-        fixed, _ = sizes(x, u, theta, own, ca.DM.zeros(width))
-        return ca.vertcat(ca.SX(0, 1), fixed, *(sizes(x, u, theta, own, line)[1] for line in lines))
+        return self._of_rows(sizes, x, u, theta, data)
 
     @cached_property
     def typical_row_sizes(self) -> Vector:
