@@ -185,7 +185,7 @@ class Nmpc(Described):
         return self._variant(solution).inputs_jacobian(solution, 0)
 
     def policy_feedback(self, solution: Solution) -> Matrix:
-        """du_0 / ds, shape (m, n): how the policy answers to the state, by dense algebra.
+        """du_0 / ds, shape (m, n): how the policy answers to the state; 0 where u_0 is given.
 
         Raises:
             DerivativeError: as `policy_jacobian`.

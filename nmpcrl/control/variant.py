@@ -80,7 +80,9 @@ class Variant:
 
     def feedback(self, solution: Solution) -> Matrix:
         """As `Nmpc.policy_feedback`."""
-        slopes: Matrix = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
+        slopes = self.solver.feedback(self._inside(solution))
+        if slopes is None:
+            slopes = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
         if self._units is not None:
             slopes = self._units.inputs[:, None] * slopes / self._units.states
         return slopes

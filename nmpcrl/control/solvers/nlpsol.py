@@ -255,6 +255,9 @@ class Program:
     def hessian_times(self, solution: Solution, vector: Vector) -> None:
         """None: CasADi's solvers have the dense Hessian only."""
 
+    def feedback(self, solution: Solution) -> None:
+        """None, as well."""
+
     def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> None:
         """None, as well."""
 

@@ -212,22 +212,31 @@ class Compiled:
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
-        ocp = self._ocp
-        return self._slopes(
-            solution, vector, np.zeros(ocp.states.shape), np.zeros(ocp.inputs.shape)
-        )
+        return self._slopes(solution, vector, *self._no_weights)
 
     def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
         """The gradient in theta of a weighted sum of the plan; None likewise."""
         return self._slopes(solution, np.zeros(solution.theta.size), states, inputs)
 
-    def _slopes(self, solution: Solution, *directions: Matrix) -> Vector | None:
+    def feedback(self, solution: Solution) -> Matrix | None:
+        """du_0 / ds, shape (m, n), the gain of stage 0; None likewise."""
+        d, (n, m) = solution.theta.size, (self._problem.states, self._problem.inputs)
+        if self._fixed:
+            return np.zeros((m, n))
+        found = self._slopes(solution, np.zeros(d), *self._no_weights, more=n * m)
+        return None if found is None else found[d:].reshape(m, n)
+
+    @cached_property
+    def _no_weights(self) -> tuple[Matrix, Matrix]:
+        return np.zeros(self._ocp.states.shape), np.zeros(self._ocp.inputs.shape)
+
+    def _slopes(self, solution: Solution, *directions: Matrix, more: int = 0) -> Vector | None:
         if solution.took_over:  # whose states are not rolled out
             return None
         action = solution.action if self._fixed else self._no_action
         data = self.arguments.data if solution.data is None else solution.data
         given = (solution.state, solution.theta, action, self._fixed, solution.point)
-        out = np.empty(solution.theta.size)
+        out = np.empty(solution.theta.size + more)
         formed = self.slopes(data, *self.arguments[1:], *given, *directions, out)
         return out if formed else None
 

@@ -208,6 +208,7 @@ def slopes(
 
     `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights. Returns whether it could
     be formed: not where the solution is no strict minimum, or inputs cannot follow what is active.
+    Where `out` has NU NX more places, they are du_0 / ds, the gain of stage 0.
     """
     N, mu = len(discount) - 1, RIGID
     task = described(theta, data, lower, upper, sides, kind, discount, weights, fixed)
@@ -240,6 +241,8 @@ def slopes(
         for a in range(NU):
             if not abs(step.u[i, a]) < FARTHEST:
                 return False
+    for k in range(len(out) - NTHETA):
+        out[NTHETA + k] = step.K[0, k // NX, k % NX]
     costates_along(stages, step, dp)
     for i in range(N + 1):
         for a in range(NX):
