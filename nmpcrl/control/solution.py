@@ -24,10 +24,6 @@ class SolverError(RuntimeError):
         return type(self), (self.status, self.state, self.theta)
 
 
-class NoStartLeft(SolverError):
-    """The solver began anew by itself, from a standing start, too: to ask again is in vain."""
-
-
 class DerivativeError(SolverError):
     """An optimum without a derivative in theta, though a gradient of its value there is."""
 

@@ -21,7 +21,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import NoStartLeft, Solution, check_shape
+from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 from nmpcrl.control.solvers.starts import random_inputs
@@ -170,7 +170,7 @@ class Program:
                 break
             failed.append(found)
         else:
-            raise NoStartLeft("; ".join(failed), state, theta)
+            raise SolverError("; ".join(failed), state, theta)
         restarts, best = len(failed), found
         if not self._sensitivity.is_minimum(found.z, p, found.lam, found.nu):
             restarts, best = self._elsewhere(found, state, p, restarts)

@@ -16,7 +16,7 @@ from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.remembered import remembered
-from nmpcrl.control.solution import NoStartLeft, Solution, SolverError, check_shape
+from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Program
@@ -197,7 +197,7 @@ class Compiled:
         try:
             found = self._fatrop.solve(state, theta, None, *action, began=began, data=data)
         except SolverError:
-            raise NoStartLeft(
+            raise SolverError(
                 f"{Riccati.name} found no optimum from {failed:.0f} starts (the last"
                 f" {ENDS[End(int(end))]} after {iterations:.0f} iterations with a relative error of"
                 f" {error:.1e})",
