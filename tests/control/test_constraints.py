@@ -156,32 +156,36 @@ def test_a_reference_may_move():
     np.testing.assert_array_equal(given.point, solution.point)
 
 
-def train(limit: Any) -> Problem:
-    """A mass on a line, pushed by at most 1, that has to be at `limit` or left of it."""
-    return Problem(
-        states=2, inputs=1, horizon=4, gamma=0.9, theta={"r": 0.1, "limit": limit},
+def train(stages: Any, solver: str = "riccati") -> Nmpc:
+    """A mass on a line, pushed by at most 1 and by 0.5 if it can, that has to stay left of 2."""
+    problem = Problem(
+        states=2, inputs=1, horizon=4, gamma=0.9, theta={"r": 0.1, "limit": 2.0},
         model=lambda x, u, th: [x[0] + x[1], x[1] + u], lower=-1.0, upper=1.0,
         stage=lambda x, u, th: (x[0] - 9) ** 2 + th["r"] * u**2,
-        hard=Hard(lambda x, u, th: x[0] - th["limit"], stages=slice(2, None)),
+        hard=[Hard(lambda x, u, th: x[0] - th["limit"], stages), Hard(lambda x, u, th: u - 0.5)],
     )  # fmt: skip
+    return Nmpc(problem, solver=solver)
 
 
 def test_where_hard_rows_cannot_all_hold_they_are_violated_least_and_said_to_be():
     """From 0 with a speed of 3 the mass is at 3, then 5 at best, where it was to be at 2."""
-    problem = train(2.0)
-    solution = Nmpc(problem).solve(np.array([0.0, 3.0]), problem.theta)
+    nmpc, state = train(slice(2, None)), np.array([0.0, 3.0])
+    solution = nmpc.solve(state, nmpc.problem.theta)
     np.testing.assert_allclose(solution.states[:4, 0], [0, 3, 5, 6], atol=1e-5)
     assert solution.violation == pytest.approx(4.0, abs=1e-5)
     stage = (solution.states[:-1, 0] - 9) ** 2 + 0.1 * solution.inputs[:, 0] ** 2
     assert solution.value == pytest.approx(0.9 ** np.arange(4) @ stage)  # the rows cost nothing
     for name in ("fatrop", "ipopt"):
         with pytest.raises(SolverError, match=name):
-            Nmpc(problem, solver=name).solve(np.array([0.0, 3.0]), problem.theta)
+            train(slice(2, None), name).solve(state, nmpc.problem.theta)
 
 
-def test_a_hard_row_of_the_state_alone_says_nothing_of_the_first_state():
-    """It is given; the plan has to be back by the next stage."""
-    problem = train(2.0)
-    late = Nmpc(problem).solve(np.array([2.5, -1.0]), problem.theta)
-    assert late.violation <= 1e-6
-    assert late.states[2:, 0].max() == pytest.approx(2.0, abs=1e-5)
+def test_hard_rows_that_no_plan_can_change_do_not_count(solver):
+    """Those of the first state, and of a first input that is given."""
+    nmpc, state = train(None, solver), np.array([2.5, -0.6])
+    for action in (None, np.array([0.6])):
+        solution = nmpc.solve(state, nmpc.problem.theta, action=action)
+        assert solution.violation <= 1e-6
+        assert solution.states[1:, 0].max() == pytest.approx(2.0, abs=1e-5)
+        assert solution.inputs[1:].max() <= 0.5 + 1e-6
+        assert action is None or solution.action == pytest.approx(0.6)
