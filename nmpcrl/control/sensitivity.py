@@ -131,9 +131,9 @@ class Sensitivity:
         """The largest violation of the KKT conditions, 0 at an optimum.
 
         Stationarity counts relative to the largest multiplier; complementarity as the smaller of a
-        multiplier and its constraint's distance, each in its unit of `Ocp.sizes`. Where it is to be `relative`,
-        multipliers are taken in parts of the largest, and distances in parts of the largest
-        variable.
+        multiplier and its constraint's distance, each in its unit of `Ocp.sizes`. Where it is to be
+        `relative`, multipliers are taken in parts of the largest, and distances in parts of the
+        largest variable.
         """
         ocp = self._ocp
         g, slope = (part.full().ravel() for part in self._conditions(z, p, lam))

@@ -148,21 +148,21 @@ def _row(step: Step) -> Vector:
 class Loop:
     """`loop.episode` with the learner, the plant and the controller of a trainer."""
 
-    def __init__(self, trainer: Trainer, moves: Moves, machine: Any, *functions: Any) -> None:
+    def __init__(
+        self, trainer: Trainer, moves: Moves, machine: Any, fixed: Any, *functions: Any
+    ) -> None:
         """Compile it, if that was not done before on this machine.
 
         Args:
             trainer: has everything else.
             moves: how theta moves; step sizes of 0 where nothing is learned.
             machine: the solver, as `Nmpc.machine` returns it.
+            fixed: the one with u_0 fixed where Q(s, a) is learned, else `machine`.
             functions: the plant and its cost, compiled.
         """
         code, nmpc, learner = load("loop", TEXTS, NOTICE), trainer.nmpc, trainer.learner
-        problem, given_action, place = machine.arguments, machine.arguments, 0
-        if trainer.constrained:
-            fixed = nmpc.machine(fix_action=True)
-            assert fixed is not None  # as `machine` is not
-            given_action, place = fixed.arguments, fixed.place
+        problem, given_action = machine.arguments, fixed.arguments
+        place = fixed.place if trainer.constrained else 0
         least, most = moves.projection or learner.bounds or (-np.inf, np.inf)
         d, rule = trainer.weights.theta.size, code.SEMI_GRADIENT
         slopes, *network = code.absent
@@ -199,13 +199,14 @@ class Loop:
         ):
             return None
         machine = nmpc.machine(fix_action=False)
-        if machine is None:
+        fixed = nmpc.machine(fix_action=True) if trainer.constrained else machine
+        if machine is None or fixed is None:
             return None
         assert nmpc.task  # or the environment would be no plant
         step, cost = plant.transition, nmpc.task.charge(nmpc.m)
         try:
             functions = compiled(step, returned=False), compiled(cost, returned=True)
-            return cls(trainer, moves, machine, *functions)
+            return cls(trainer, moves, machine, fixed, *functions)
         except CannotCompile:
             return None
 
