@@ -83,6 +83,6 @@ def test_the_run_without_an_intervention_is_a_run_of_the_study(outcomes):
 
 @pytest.mark.slow
 def test_with_the_true_slope_a_run_survives_that_is_stopped_without():
-    experiment = Experiment("RDES", layout="D", seed=0, decay="episode", episodes=12)
+    experiment = Experiment("RDES", layout="D", seed=5, decay="episode", episodes=12)
     assert watch(experiment).stopped
     assert not watch(experiment, "true slope").stopped
