@@ -9,7 +9,6 @@ import pytest
 
 from nmpcrl.control import Nmpc, Problem, Riccati, Series, Soft, SolverError, Status, rk4
 from nmpcrl.control.solvers.codes import End
-from nmpcrl.control.solvers.riccati import SEVERAL
 
 PERIOD = 0.1  # s
 
@@ -119,8 +118,7 @@ HELD = {
 def test_cold_solves_are_no_worse_than_those_of_fatrop_and_ipopt(name):
     """From the same start, all at s; where minima are many, more starts are compared."""
     problem, states = HELD[name]
-    starts = 9 if "swings up" in name else SEVERAL
-    ours = Nmpc(problem, solver=Riccati(starts=starts))
+    ours = Nmpc(problem)
     others = [Nmpc(problem, solver=solver) for solver in ("fatrop", "ipopt")]
     taken_over = 0
     for state in states:

@@ -4,11 +4,13 @@ from collections.abc import Iterator
 from itertools import islice, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.problem import Problem
 
 SHARES = (0.4, 1.0)  # of the bounds near which inputs are held
+WIDE = 2.0, 100.0  # distances of a bound from rest at which inputs are held at the bound itself
 CORNERS = 8  # of the box of inputs, at most, with each share
 MOST = 64  # cold starts that can be asked for
 
@@ -25,8 +27,14 @@ def random_inputs(of: Problem, seed: int, horizon: int) -> Matrix:
 
 
 def _inputs(of: Problem, horizon: int) -> Iterator[Matrix]:
-    """Each input held near a bound, gently and then fully; then drawn ones."""
-    lower, upper = _sides(of)
+    """Each input held near a bound, gently and then fully; then drawn ones.
+
+    A bound beyond 1 counts as 1 unless its distance lies within `WIDE`: a robot that keeps turning
+    at pi / 2 finds no way around a wall.
+    """
+    (lower, upper), nearest = _sides(of), np.clip(0.0, of.lower, of.upper)
+    lower = np.where(_wide(nearest - of.lower), of.lower, lower)
+    upper = np.where(_wide(of.upper - nearest), of.upper, upper)
     signs = product((True, False), repeat=lower.size)
     corners = [np.where(above, upper, lower) for above in islice(signs, CORNERS)]
     for share in SHARES:
@@ -34,6 +42,10 @@ def _inputs(of: Problem, horizon: int) -> Iterator[Matrix]:
             yield np.tile(np.clip(share * corner, lower, upper), (horizon, 1))
     for seed in range(MOST):
         yield random_inputs(of, seed, horizon)
+
+
+def _wide(distance: Vector) -> NDArray[np.bool_]:
+    return (distance >= WIDE[0]) & (distance <= WIDE[1])
 
 
 def _sides(of: Problem) -> tuple[Vector, Vector]:

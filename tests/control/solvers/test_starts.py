@@ -84,7 +84,18 @@ def test_all_starts_that_can_be_asked_for_lie_within_the_bounds_and_differ():
     assert len({u.tobytes() for u in found}) == len(found)
 
 
-def test_an_unbounded_input_is_held_at_plus_and_minus_one():
+@pytest.mark.parametrize(
+    ("lower", "upper", "held"),
+    [
+        (-np.inf, np.inf, [0.4, -0.4, 1.0, -1.0]),
+        (-1.6, 1e3, [0.4, -0.4, 1.0, -1.0]),
+        (-0.5, 5.0, [2.0, -0.2, 5.0, -0.5]),
+        (3.0, 20.0, [8.0, 3.0, 20.0, 3.0]),
+    ],
+)
+def test_an_input_is_held_near_its_bounds_where_these_are_wide_and_else_within_one(
+    lower, upper, held
+):
     problem = Problem(
         states=1,
         inputs=1,
@@ -92,6 +103,7 @@ def test_an_unbounded_input_is_held_at_plus_and_minus_one():
         theta={"a": 1.0},
         model=lambda x, u, th: th["a"] * x + u,
         stage=lambda x, u, th: ca.sumsqr(x) + ca.sumsqr(u),
+        lower=lower,
+        upper=upper,
     )
-    gentle = [u[0, 0] for u in cold_inputs(problem, 2, 4)]
-    assert gentle == [0.4, -0.4, 1.0, -1.0]
+    assert [u[0, 0] for u in cold_inputs(problem, 2, 4)] == held
