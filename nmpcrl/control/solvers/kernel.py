@@ -174,6 +174,7 @@ class Stages(NamedTuple):
     px: np.ndarray  # of lam' h, (N + 1, NX)
     pu: np.ndarray  # (N + 1, NU)
     p: np.ndarray  # costates, (N + 1, NX)
+    gap: np.ndarray  # what a step adds to x_i besides A dx + B du: 0 along a plan, (N + 1, NX)
     Q: np.ndarray  # Hessian of the Lagrangian, (N + 1, NX, NX)
     S: np.ndarray  # (N + 1, NU, NX)
     R: np.ndarray  # (N + 1, NU, NU)
@@ -199,6 +200,7 @@ class Step(NamedTuple):
     p: np.ndarray  # costates, (N + 1, NX)
     V: np.ndarray  # Hessian and gradient of the cost to go, (N + 1, NX, NX)
     v: np.ndarray  # (N + 1, NX)
+    w: np.ndarray  # v + V gap, (NX,)
     VA: np.ndarray  # (NX, NX)
     VB: np.ndarray  # (NX, NU)
     L: np.ndarray  # (NU, NU)
@@ -440,14 +442,17 @@ def factorise(stages, delta, first, step):
     """Step 5: the Riccati recursion; false where Q_uu + delta I is not positive definite."""
     A, B, r, S, R = stages.A, stages.B, stages.r, stages.S, stages.R
     last = len(A)
-    V, v, VA, VB, L, F, f = step.V, step.v, step.VA, step.VB, step.L, step.F, step.f
+    V, v, w, VA, VB = step.V, step.v, step.w, step.VA, step.VB
+    L, F, f, gap = step.L, step.F, step.f, stages.gap
     for a in range(NX):
         v[last, a] = stages.q[last, a]
         for b in range(NX):
             V[last, a, b] = stages.Q[last, a, b]
     for i in range(last - 1, first - 1, -1):
         for a in range(NX):
+            w[a] = v[i + 1, a]
             for b in range(NX):
+                w[a] += V[i + 1, a, b] * gap[i + 1, b]
                 VA[a, b] = 0.0
                 for c in range(NX):
                     VA[a, b] += V[i + 1, a, c] * A[i, c, b]
@@ -458,7 +463,7 @@ def factorise(stages, delta, first, step):
         for a in range(NU):
             f[a] = r[i, a]
             for c in range(NX):
-                f[a] += B[i, c, a] * v[i + 1, c]
+                f[a] += B[i, c, a] * w[c]
             for b in range(NX):
                 F[a, b] = S[i, a, b]
                 for c in range(NX):
@@ -476,7 +481,7 @@ def factorise(stages, delta, first, step):
         for a in range(NX):
             total = stages.q[i, a]
             for c in range(NX):
-                total += A[i, c, a] * v[i + 1, c]
+                total += A[i, c, a] * w[c]
             for c in range(NU):
                 total += F[c, a] * step.k[i, c]
             v[i, a] = total
@@ -544,45 +549,13 @@ def convex(stages, first, step, size):
 
 
 @inlined
-def drifting(task, stages, step, drift, steer):
-    """Take up defects f, in `drift` from stage 1 on: states and inputs that move by feedback alone.
-
-    They replace the defects; q and r receive what the move adds, so that `factorise` and `sweep`
-    find the rest of the step. An unstable model would carry defects away that were rolled out.
-    """
-    last = len(step.u)
-    for a in range(NX):
-        drift[0, a] = 0.0
-    for i in range(last + 1):
-        for a in range(NU if i < last else 0):
-            steer[i, a] = 0.0
-            for b in range(NX if i >= task.first else 0):
-                steer[i, a] += step.K[i, a, b] * drift[i, b]
-        for a in range(NX if i < last else 0):
-            for b in range(NX):
-                drift[i + 1, a] += stages.A[i, a, b] * drift[i, b]
-            for b in range(NU):
-                drift[i + 1, a] += stages.B[i, a, b] * steer[i, b]
-        for a in range(NX):
-            for b in range(NX):
-                stages.q[i, a] += stages.Q[i, a, b] * drift[i, b]
-            for b in range(NU if i < last else 0):
-                stages.q[i, a] += stages.S[i, b, a] * steer[i, b]
-        for a in range(NU if i < last else 0):
-            for b in range(NX):
-                stages.r[i, a] += stages.S[i, a, b] * drift[i, b]
-            for b in range(NU):
-                stages.r[i, a] += stages.R[i, a, b] * steer[i, b]
-
-
-@inlined
 def regulate(task, plan, stages, step, point):
     """Inputs for a model that falls over at rest: the plan of one LQ problem, held by its feedback.
 
     The problem is linearised where every stage stands still at s. That is no plan, so its sweep
     closes the defects f(s, u) - s; the model is then rolled out under u + k + K (x - s).
     """
-    x, u, drift, last, size = plan.x, plan.u, step.x, len(plan.u), 0.0
+    x, u, gap, last, size = plan.x, plan.u, stages.gap, len(plan.u), 0.0
     clear(stages)
     for i in range(last + 1):
         for a in range(NX):
@@ -599,21 +572,15 @@ def regulate(task, plan, stages, step, point):
             stages.A[i], stages.B[i], stages.lx[i], stages.lu[i],
             stages.Q[i], stages.S[i], stages.R[i],
         )  # fmt: skip
-        transition(x[i], u[i], task.theta, task.data[i], drift[i + 1])
+        transition(x[i], u[i], task.theta, task.data[i], gap[i + 1])
         for a in range(NX):
-            drift[i + 1, a] -= x[i, a]
+            gap[i + 1, a] -= x[i, a]
             size = max(size, abs(stages.Q[i, a, a]), abs(stages.Q[last, a, a]))
         for a in range(NU):
             size = max(size, abs(stages.R[i, a, a]))
     begin_sides(stages)
     convex(stages, task.first, step, size)
-    drifting(task, stages, step, drift, step.u)
-    factorise(stages, 0.0, task.first, step)
-    for i in range(last):
-        for a in range(NX):
-            x[i, a] += drift[i, a]
-        for a in range(NU):
-            step.k[i, a] += step.u[i, a]
+    gap[:] = 0.0
     follow(task, plan, step, 1.0, CAUTIOUS, point)
 
 
@@ -642,7 +609,7 @@ def sweep(task, stages, step):
                 for b in range(NX):
                     step.u[i, a] += step.K[i, a, b] * step.x[i, b]
         for a in range(NX):
-            total = 0.0
+            total = stages.gap[i + 1, a]
             for b in range(NX):
                 total += stages.A[i, a, b] * step.x[i, b]
             for b in range(NU):
@@ -1105,7 +1072,7 @@ def allocate(N, rows):
         np.zeros((N, NX, NX)), np.zeros((N, NX, NU)),
         np.zeros(((N + 1) * rows, NX)), np.zeros(((N + 1) * rows, NU)),
         np.empty((N + 1, NX)), np.empty((N + 1, NU)), np.empty((N + 1, NX)), np.empty((N + 1, NU)),
-        np.empty((N + 1, NX)),
+        np.empty((N + 1, NX)), np.zeros((N + 1, NX)),
         np.empty((N + 1, NX, NX)), np.empty((N + 1, NU, NX)), np.empty((N + 1, NU, NU)),
         np.empty((N + 1, NX)), np.empty((N + 1, NU)),
         np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.zeros((N + 1) * rows),
@@ -1115,7 +1082,7 @@ def allocate(N, rows):
         np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((N + 1, NX)), np.empty((N, NU)),
         np.empty((N + 1) * rows), np.empty((N, NU)), np.empty((N, NU)),
         np.empty((N + 1, NX)), np.empty((N + 1, NX, NX)), np.empty((N + 1, NX)),
-        np.empty((NX, NX)), np.empty((NX, NU)),
+        np.empty(NX), np.empty((NX, NX)), np.empty((NX, NU)),
         np.empty((NU, NU)), np.empty((NU, NX)), np.empty(NU),
     )  # fmt: skip
     return point, trial, duals, stages, step

@@ -9,8 +9,7 @@ sweep from the other side, one for each number of the plan and not one for each 
 Where rows and bounds are active that no input can follow all at once, springs of the barrier would
 share what is left between them: `independent` finds out, and `Sensitivity` takes a side instead.
 
-The dynamics' share of G w, f_theta w, is taken up by a `drift` of the states in which inputs move
-by the feedback alone, lest an unstable model carry it away.
+The dynamics' share of G w, f_theta w, is the gap of each stage that the sweep closes.
 """
 
 import numpy as np
@@ -27,7 +26,6 @@ from .kernel import (
     begin_multipliers,
     condense,
     described,
-    drifting,
     factorise,
     inlined,
     linearise,
@@ -127,8 +125,8 @@ def pull_of_rows(task, stages, i):
 
 
 @inlined
-def right_hand_side(task, point, stages, step, w, drift, steer):
-    """G w as q, r and `off`, and as the drift, after `condense` and `factorise`."""
+def right_hand_side(task, point, stages, w):
+    """G w as q, r, `off` and gaps, after `condense`."""
     last, theta, held, off = len(point.u), task.theta, stages.held, stages.off
     stages.q[:] = 0.0
     stages.r[:] = 0.0
@@ -136,7 +134,7 @@ def right_hand_side(task, point, stages, step, w, drift, steer):
         q, r, d, rate = stages.q[i], stages.r[i], task.data[i], task.rate[i:]
         x, u, t = point.x[i], point.u[min(i, last - 1)], i * task.rows
         if i < last:
-            stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, drift[i + 1])
+            stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, stages.gap[i + 1])
         else:
             terminal_mixed(x, theta, d, rate, w, q)
         if i >= task.begin:
@@ -151,12 +149,11 @@ def right_hand_side(task, point, stages, step, w, drift, steer):
             for j in range(task.rows):
                 off[t + j] = off[t + j] if task.planned[t + j] > 0.0 else 0.0
             pull_of_rows(task, stages, i)
-    drifting(task, stages, step, drift, steer)
 
 
 @inlined
 def costates_along(stages, step, dp):
-    """How the costates change along the step, before the drift is added to it."""
+    """How the costates change along the step."""
     last = len(step.u)
     for i in range(last, -1, -1):
         for a in range(NX):
@@ -213,8 +210,8 @@ def slopes(
     N, mu = len(discount) - 1, RIGID
     task = described(theta, data, lower, upper, sides, kind, discount, weights, fixed)
     point, _, duals, stages, step = allocate(N, task.rows)
-    drift, dp, steer = np.empty((N + 1, NX)), np.empty((N + 1, NX)), np.empty((N, NU))
-    begin_inputs(task, point, state, action, SAME, steer, solved)
+    dp = np.empty((N + 1, NX))
+    begin_inputs(task, point, state, action, SAME, point.u, solved)
     roll(task, point)
     factor = scale(task, point, weights)
     begin_multipliers(task, point, duals, SAME, mu, factor, solved)
@@ -229,7 +226,7 @@ def slopes(
     step.lam[:] = 0.0
     if not independent(task, stages, step):
         return False
-    right_hand_side(task, point, stages, step, w, drift, steer)
+    right_hand_side(task, point, stages, w)
     for i in range(N + 1):
         for a in range(NX):
             stages.q[i, a] += of_states[i, a] / factor
@@ -244,11 +241,6 @@ def slopes(
     for k in range(len(out) - NTHETA):
         out[NTHETA + k] = step.K[0, k // NX, k % NX]
     costates_along(stages, step, dp)
-    for i in range(N + 1):
-        for a in range(NX):
-            step.x[i, a] += drift[i, a]
-        for a in range(NU if i < N else 0):
-            step.u[i, a] += steer[i, a]
     rows_along(task, stages, step)
     scale_rows(task, stages, step)
     settle(task, point, tie, point.h, stages.firm, stages.held)
