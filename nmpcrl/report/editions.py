@@ -204,7 +204,7 @@ def table(both: pd.DataFrame, group: str) -> str:
         )
         for one in both[both.group == group].itertuples()
     )
-    return html_table(group, ("", "Expected", "First edition", "Today", "Stands"), rows)
+    return html_table(group, ("Outcome", "Expected", "First edition", "Today", "Stands"), rows)
 
 
 def _cell(line: Line) -> str:

@@ -15,6 +15,7 @@ from nmpcrl.study import Experiment
 FIGURE = "runs"
 CHAPTERS = ("05_results", "07_beyond")
 SAME = 1e-6  # relative: theta is published in single precision, which moves the cost by 1e-7
+EARLIER = 1e-3  # of runs that an earlier solver made
 SLIDER = "Episode"
 HOLDS = "figure => figure.shown.given.episode"
 UNDERWAY = """() => {
@@ -72,7 +73,8 @@ def assert_equal_to_published(shown: dict, known) -> None:
         else:
             assert one["theta"] == run.evaluations["theta"][at].tolist()
             assert one["judged"] == run.evaluations["cost"][at]
-        assert one["cost"] == pytest.approx(one["judged"], rel=SAME)
+        within = SAME if known.is_current("main") else EARLIER
+        assert one["cost"] == pytest.approx(one["judged"], rel=within)
         assert not one["failed"]
 
 
