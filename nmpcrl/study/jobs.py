@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
@@ -165,6 +166,8 @@ def processes(count: int) -> Iterator[Executor]:
     """A pool of fresh interpreters with one thread each, which end with the context."""
     from joblib.externals.loky import ProcessPoolExecutor
 
+    # loky warns in its own thread of a worker that it replaces; an error would end that thread
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     pool = ProcessPoolExecutor(
         count, env=ONE_THREAD, initializer=_end_with_parent, initargs=(os.getpid(),)
     )
