@@ -5,26 +5,27 @@ from dataclasses import asdict
 import numpy as np
 
 from nmpcrl.study import Experiment, Records
-from nmpcrl.study.records import EvaluationRow, StepRow, form_of
+from nmpcrl.study.records import COLUMNS
+from nmpcrl.study.run import COUNTED
 
 CLOCKS = {"seconds"}
 
 
 def made_records(experiment: Experiment, rows: int, seed: int = 0) -> Records:
     """A run of the robot, always the same for a seed."""
-    rng = np.random.default_rng(seed)
+    rng, steps = np.random.default_rng(seed), experiment.steps
+    shapes = {"state": (3,), "action": (2,), "states": (steps, 3), "actions": (steps, 2)}
+    shapes |= dict.fromkeys(("features", "theta", "w"), (9,))
 
-    def drawn(row: type, rows: int) -> dict[str, np.ndarray]:
-        columns = form_of(row, 3, 2, 9, experiment.steps).fields.items()
-        return {
-            name: (10 * rng.normal(size=(rows, *kind.shape))).astype(kind.base)
-            for name, (kind, _) in columns
+    def drawn(table: str, rows: int) -> dict[str, np.ndarray]:
+        columns = {
+            name: 10 * rng.normal(size=(rows, *shapes.get(name, ()))) for name in COLUMNS[table]
         }
+        return {name: one.astype(int) if name in COUNTED else one for name, one in columns.items()}
 
-    steps = drawn(StepRow, rows) | {"alpha_phi2": rng.normal(size=rows)}
     facts = {"stopped": "diverged: “why”", "solver": "riccati", "seconds": 1.25}
     facts["final_cost"] = seed / 7 or np.inf
-    return Records(asdict(experiment), steps, drawn(EvaluationRow, 3), facts)
+    return Records(asdict(experiment), drawn("steps", rows), drawn("evaluations", 3), facts)
 
 
 def assert_same_numbers(one, other, but: frozenset[str] = frozenset()) -> None:

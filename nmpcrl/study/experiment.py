@@ -53,43 +53,27 @@ class Experiment:
     episodes: int = option(paper.EPISODES, whole(1, MOST_EPISODES), "Episodes of training.")
     layout: str | tuple[tuple[float, float], ...] = option("A", LAYOUT, "Layout of the obstacles.")
     decay: str = option("step", one_of(DECAYS), "What k of Eq. (5) counts.")  # departure C
-    decay_rate: float = option(
-        paper.DECAY_RATE, positive(1), "c_epsilon, by which exploration decays."
-    )
+    decay_rate: float = option(paper.DECAY_RATE, positive(1), "c_epsilon, exploration's decay.")
     alpha: float = option(paper.ALPHA, STEP_SIZE, "Step size of theta.")
     beta: float = option(paper.BETA, STEP_SIZE, "Step size of w.")
     zeta: float = option(paper.ZETA, STEP_SIZE, "Learning rate of the network.")
-    gated: bool = option(  # False: Algorithm 1 # departure G
-        True, TRUTH, "Whether theta waits for the network's first fit."
-    )
-    clipped: bool = option(  # departure E
-        True, TRUTH, "Whether noisy actions are clipped to the action space."
-    )
-    constrained: bool = option(  # departure F
-        False, TRUTH, "Whether Q(s, a) is learned, with u_0 = a fixed, and not V(s)."
-    )
-    network: str = option(  # departure H
-        "plain", one_of(NETWORKS), "Reading of what the paper leaves open of the network."
-    )
+    gated: bool = option(True, TRUTH, "Whether theta waits for a first fit.")  # departure G
+    clipped: bool = option(True, TRUTH, "Whether noisy actions are clipped.")  # departure E
+    constrained: bool = option(False, TRUTH, "Whether Q(s, a) replaces V(s).")  # departure F
+    network: str = option("plain", one_of(NETWORKS), "Variant of the network.")  # departure H
     box: str = option("hard", one_of(paper.BOXES), "Bounds of the state.")  # departures A and M
-    ties_active: bool = option(  # departure L
-        False, TRUTH, "Whether a state on an obstacle's boundary is in the obstacle."
-    )
+    ties_active: bool = option(False, TRUTH, "Whether obstacles are closed sets.")  # departure L
     curvature: bool = option(True, TRUTH, "Whether TDC subtracts h.")
     projected: bool = option(True, TRUTH, "Whether TDC projects theta into [0, 10].")
     beta_tdc: float = option(paper.BETA_TDC, STEP_SIZE, "Step size of w in TDC.")
-    theta: tuple[float, ...] = option(
-        paper.THETA_INIT, THETA, "Parameters of the controller at the start."
-    )
+    theta: tuple[float, ...] = option(paper.THETA_INIT, THETA, "theta at the start of training.")
     steps: int = option(paper.STEPS, whole(1, MOST_STEPS), "Steps of an episode.")
     start: tuple[float, ...] = option(paper.START, POSE, "Pose where an episode begins.")
     target: tuple[float, ...] = option(paper.TARGET, POSE, "Pose that the robot is to reach.")
     horizon: int = option(paper.HORIZON, whole(1, MOST_STAGES), "N, the inputs of a plan.")
     solver: str = option("riccati", one_of(solvers.SOLVERS), "Solver of Eq. (2).")
     tolerance: float = option(solvers.TOLERANCE, TOLERANCE, "Tolerance of the solver.")
-    evaluate_every: int = option(
-        10, whole(1, MOST_EPISODES), "Episodes between rollouts without noise."
-    )
+    evaluate_every: int = option(10, whole(1, MOST_EPISODES), "Episodes between evaluations.")
 
     def __post_init__(self) -> None:
         for one in fields(self):

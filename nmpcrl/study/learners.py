@@ -7,25 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Vector, learning
 from nmpcrl.control import Nmpc
-from nmpcrl.learning import (
-    Learner,
-    deep_expected_sarsa,
-    expected_sarsa,
-    frozen,
-    gradient_expected_sarsa,
-    gradient_tdc,
-    q_learning,
-    random_direction,
-    regularized_deep_expected_sarsa,
-    step_matched,
-)
+from nmpcrl.learning import Learner
 from nmpcrl.learning.network import QNetwork, Target
 from nmpcrl.learning.training import count_episodes, count_steps
 from nmpcrl.study import paper
-
-LEAST_SCALE = 1e-3  # of an input of the normalised network
 
 DECAYS = {"step": count_steps, "episode": count_episodes}  # departure C
 Settings = Any  # an `Experiment`
@@ -67,7 +54,7 @@ NETWORKS = {
 
 
 def _scales(nmpc: Nmpc, theta: Vector, *, with_theta: bool) -> tuple[Vector, float]:
-    """The scales of the normalised network's inputs and of its target.
+    """The scales of the normalised network's inputs and of its target, 1e-3 or more.
 
     A state is divided by the box's half width, or by pi without a box; an action by its bound;
     theta by theta_init; the value by the value of theta_init at the start.
@@ -76,7 +63,7 @@ def _scales(nmpc: Nmpc, theta: Vector, *, with_theta: bool) -> tuple[Vector, flo
     state = np.where(np.isfinite(half), half, np.pi)
     parts = [state, nmpc.plant.upper, *([np.abs(theta)] if with_theta else [])]
     value = nmpc.solve(nmpc.task.start, theta).value
-    return np.maximum(np.concatenate(parts), LEAST_SCALE), max(abs(value), LEAST_SCALE)
+    return np.maximum(np.concatenate(parts), 1e-3), max(abs(value), 1e-3)
 
 
 # Fields read by learners that move theta, that solve for V(s) or Q(s, a), and with a network.
@@ -129,14 +116,15 @@ def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
 
 
 LEARNERS: dict[str, Entry] = {
-    "ES": Entry(lambda e, nmpc, _: expected_sarsa(nmpc, e.alpha)),
-    "DES": _imitating(deep_expected_sarsa, with_theta=False),
-    "RDES": _imitating(regularized_deep_expected_sarsa, with_theta=True),
+    "ES": Entry(lambda e, nmpc, _: learning.expected_sarsa(nmpc, e.alpha)),
+    "DES": _imitating(learning.deep_expected_sarsa, with_theta=False),
+    "RDES": _imitating(learning.regularized_deep_expected_sarsa, with_theta=True),
     "GES": Entry(
-        lambda e, nmpc, _: gradient_expected_sarsa(nmpc, e.alpha, e.beta), (*VALUING, "beta")
+        lambda e, nmpc, _: learning.gradient_expected_sarsa(nmpc, e.alpha, e.beta),
+        (*VALUING, "beta"),
     ),
     "TDC": Entry(
-        lambda e, nmpc, _: gradient_tdc(
+        lambda e, nmpc, _: learning.gradient_tdc(
             nmpc,
             e.alpha,
             e.beta_tdc,
@@ -146,10 +134,14 @@ LEARNERS: dict[str, Entry] = {
         (*VALUING, "curvature", "projected", "beta_tdc"),
         curved=True,
     ),
-    "QL": Entry(lambda e, nmpc, _: q_learning(nmpc, e.alpha), MOVING, valued=True),
-    "frozen": Entry(lambda _, nmpc, __: frozen(nmpc), reads=(), solves=1),
-    "matched": Entry(lambda e, nmpc, _: step_matched(nmpc, e.alpha, e.beta), (*VALUING, "beta")),
-    "random": Entry(lambda e, nmpc, rngs: random_direction(nmpc, e.alpha, rngs.directions)),
+    "QL": Entry(lambda e, nmpc, _: learning.q_learning(nmpc, e.alpha), MOVING, valued=True),
+    "frozen": Entry(lambda _, nmpc, __: learning.frozen(nmpc), reads=(), solves=1),
+    "matched": Entry(
+        lambda e, nmpc, _: learning.step_matched(nmpc, e.alpha, e.beta), (*VALUING, "beta")
+    ),
+    "random": Entry(
+        lambda e, nmpc, rngs: learning.random_direction(nmpc, e.alpha, rngs.directions)
+    ),
 }
 
 

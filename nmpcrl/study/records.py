@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.files import write_file
 from nmpcrl.study.refusal import Refusal
@@ -18,7 +18,14 @@ from nmpcrl.study.refusal import Refusal
 Column = NDArray[Any]
 
 LAST = 3  # rollouts that the final cost averages
-REMOVED = {"plant": "model"}  # former fields of experiments, with the one value that is read
+COLUMNS = {  # as `Records` describes them
+    "steps": (
+        *("episode", "time", "state", "action", "cost", "value", "next_value", "delta", "features"),
+        *("theta", "w", "loss", "status", "restarts", "violation", "iterations", "solves"),
+        *("seconds", "alpha_phi2"),
+    ),
+    "evaluations": ("episode", "theta", "cost", "states", "actions"),
+}
 
 
 class DamagedRecords(Refusal):
@@ -56,55 +63,6 @@ def final_cost(cost: Vector) -> float:
     return float(learned.mean()) if learned.size else np.inf
 
 
-class StepRow(NamedTuple):
-    """A row of `Records.steps`, without alpha_phi2, which is computed at the end of a run."""
-
-    episode: int
-    time: int
-    state: Vector
-    action: Vector
-    cost: float
-    value: float
-    next_value: float
-    delta: float
-    features: Vector
-    theta: Vector
-    w: Vector
-    loss: float
-    status: int
-    restarts: int
-    violation: float
-    iterations: int
-    solves: int
-    seconds: float
-
-
-class EvaluationRow(NamedTuple):
-    """A row of `Records.evaluations`."""
-
-    episode: int
-    theta: Vector
-    cost: float
-    states: Matrix
-    actions: Matrix
-
-
-def form_of(row: type[NamedTuple], n: int, m: int, d: int, steps: int) -> np.dtype[Any]:
-    """The columns of `StepRow` or `EvaluationRow` for n states, m inputs and d parameters.
-
-    `steps` is the length of a rollout.
-    """
-    shapes: dict[str, int | tuple[int, int]] = dict.fromkeys(("features", "theta", "w"), d)
-    shapes |= {"state": n, "action": m, "states": (steps, n), "actions": (steps, m)}
-    fields = row.__annotations__.items()
-    return np.dtype([(one, float, shapes[one]) if one in shapes else (one, t) for one, t in fields])
-
-
-def columns(rows: NDArray[Any]) -> dict[str, Column]:
-    """An array for each field of a structured array."""
-    return {name: rows[name].copy() for name in rows.dtype.fields or ()}
-
-
 @dataclass(frozen=True, eq=False)
 class Records:
     """One run.
@@ -139,9 +97,6 @@ class Records:
         return cls(experiment=experiment, facts=facts, **tables)
 
 
-COLUMNS = {"steps": (*StepRow._fields, "alpha_phi2"), "evaluations": EvaluationRow._fields}
-
-
 def save_run(
     path: Path,
     experiment: Mapping[str, Any],
@@ -174,7 +129,11 @@ def load_run(
     with path.open("rb") as raw:
         try:
             with np.load(raw, allow_pickle=False) as file:
-                about = _stated(json.loads(str(file["about"])))
+                about = About(**json.loads(str(file["about"])))
+                if "solver" not in about.facts:
+                    raise ValueError("about")
+                if "states" not in about.experiment:  # which a trial has
+                    Experiment(**about.experiment)
                 for member in file.files:
                     table, _, name = member.partition("/")
                     if name in columns.get(table, ()):
@@ -190,11 +149,3 @@ def load_run(
 def about(path: Path) -> About:
     """The experiment and the facts of a file; errors as in `load_run`."""
     return load_run(path, {})[0]
-
-
-def _stated(about: dict[str, Any]) -> About:
-    fields, facts = about["experiment"].items(), about["facts"]
-    experiment = {name: value for name, value in fields if REMOVED.get(name) != value}
-    if "states" not in experiment:  # which a trial has
-        Experiment(**experiment)
-    return About(experiment, facts | {"solver": facts["solver"]})

@@ -2,8 +2,7 @@
 
 import gc
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,19 +11,11 @@ from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, absurd
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import (
-    Column,
-    EvaluationRow,
-    Records,
-    StepRow,
-    StepStatus,
-    Stopped,
-    columns,
-    final_cost,
-    form_of,
-)
+from nmpcrl.study.records import COLUMNS, Column, Records, StepStatus, Stopped, final_cost
 from nmpcrl.study.setup import Job, job_of
 from nmpcrl.study.trial import Trial
+
+COUNTED = ("episode", "time", "status", "restarts", "iterations", "solves")  # whole numbers
 
 
 def run(
@@ -46,13 +37,13 @@ def run(
 
 def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     named, controller, weights = job.named, job.controller, job.weights
-    sizes = controller.n, controller.m, weights.theta.size, named.steps
-    made, stopped = list[tuple[Episode, float]](), str(Stopped.FINISHED)
+    made, seconds, stopped = list[Episode](), list[float](), str(Stopped.FINISHED)
     evaluations, began = [_evaluation(job, weights, 0)], time.perf_counter()
     try:
         how = {**job.options, **job.environment}
         for episode in episodes(job.learner, controller, weights, job.explore, **how):
-            made.append((episode, time.perf_counter() - began))
+            made.append(episode)
+            seconds.append(time.perf_counter() - began)
             done = episode.number + 1
             due = done % named.evaluate_every == 0 or done == named.episodes
             if due and not absurd(episode.weights, controller.largest):
@@ -62,38 +53,35 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
             began = time.perf_counter()
     except Diverged as error:
         stopped = f"{Stopped.DIVERGED}: {error}"
-    table = _table(made, form_of(StepRow, *sizes))
-    judged = columns(np.array(evaluations, form_of(EvaluationRow, *sizes)))
-    alpha = named.alpha if isinstance(named, Experiment) else np.nan
-    table["alpha_phi2"] = alpha * (table["features"] ** 2).sum(axis=1)
-    others = [episode.solver for episode, _ in made if episode.solver]
+    steps = _steps(made, seconds, named.alpha if isinstance(named, Experiment) else np.nan)
+    judged = map(np.array, zip(*evaluations, strict=True))
+    table = dict(zip(COLUMNS["evaluations"], judged, strict=True))
+    others = [episode.solver for episode in made if episode.solver]
     facts = {
         "stopped": stopped,
         "solver": [controller.solver.name, *others][-1],  # another if it took over, if only once
-        "seconds": float(table["seconds"].sum()),
-        "final_cost": final_cost(judged["cost"]),
+        "seconds": float(steps["seconds"].sum()),
+        "final_cost": final_cost(table["cost"]),
     }
-    return Records(named.stated, table, judged, facts)
+    return Records(named.stated, steps, table, facts)
 
 
-def _table(made: list[tuple[Episode, float]], form: np.dtype[Any]) -> dict[str, Column]:
+def _steps(made: Sequence[Episode], seconds: Sequence[float], alpha: float) -> dict[str, Column]:
     """`Records.steps` from the episodes and the time that each took [s]."""
-    rows = np.empty(sum(episode.steps for episode, _ in made), form)
-    at = 0
-    for episode, seconds in made:
-        part, length = rows[at : at + episode.steps], episode.steps
-        for name, column in episode.columns.items():
-            part[name] = column
-        part["episode"], part["time"] = episode.number, np.arange(length)
-        part["seconds"] = seconds / length
-        part["status"] = np.where(part["restarts"], StepStatus.RESTARTED, StepStatus.SOLVED)
-        if episode.failure:
-            part["status"][-1] = StepStatus.FAILED
-        at += length
-    return columns(rows)
+    lengths = [episode.steps for episode in made]
+    found = {name: np.concatenate([e.columns[name] for e in made]) for name in made[0].columns}
+    found["episode"] = np.repeat([episode.number for episode in made], lengths)
+    found["time"] = np.concatenate([np.arange(length) for length in lengths])
+    found["seconds"] = np.repeat(np.divide(seconds, lengths), lengths)
+    found["status"] = np.where(found["restarts"] > 0, StepStatus.RESTARTED, StepStatus.SOLVED)
+    failed = [episode.failure != "" for episode in made]
+    found["status"][np.cumsum(lengths)[failed] - 1] = StepStatus.FAILED
+    found["alpha_phi2"] = alpha * (found["features"] ** 2).sum(axis=1)
+    kinds = {name: int if name in COUNTED else float for name in COLUMNS["steps"]}
+    return {name: found[name].astype(kind) for name, kind in kinds.items()}
 
 
-def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:
+def _evaluation(job: Job, weights: Weights, episode: int) -> tuple[int | float | Column, ...]:
     """The row of `Records.evaluations` for the policy of `weights`."""
     steps, rng = job.named.steps, np.random.default_rng(job.judged)
     rollout = evaluate(job.controller, weights.theta, steps, rng=rng, **job.environment)
@@ -102,4 +90,4 @@ def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:
         np.pad(reached, missing, constant_values=np.nan)
         for reached in (rollout.states, rollout.actions)
     )
-    return EvaluationRow(episode, weights.theta, rollout.cost, states, actions)
+    return episode, weights.theta, rollout.cost, states, actions

@@ -71,18 +71,12 @@ def test_a_stored_run_is_read_and_says_what_it_depends_on(runs, no_run):
         assert_same_numbers(ask(QUICK), records)
 
 
-def test_a_file_of_the_first_edition_is_read(no_run):
-    """It has a checksum, a field `plant`, and no field that became one later."""
+def test_a_file_that_was_written_before_a_field_and_with_another_member_is_read(no_run):
     records, path = fetch(LEARNING), RUNS.path_of(LEARNING)
-    fields = {**records.experiment, "plant": "model"}
-    del fields["tolerance"]
+    fields = {name: one for name, one in records.experiment.items() if name != "tolerance"}
     replace(records, experiment=fields).save(path)
     with np.load(path) as file:
         members = {**file, "checksum": np.array("0" * 64)}
-    assert set(members) == {"about", "checksum"} | {
-        *(f"steps/{name}" for name in records.steps),
-        *(f"evaluations/{name}" for name in records.evaluations),
-    }
     np.savez_compressed(path, **members)
     no_run()
     assert RUNS.is_stored(LEARNING)
