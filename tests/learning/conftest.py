@@ -9,6 +9,7 @@ import pytest
 
 from nmpcrl.control import Ipopt, Nmpc, Parameter, Problem
 from nmpcrl.learning import Transition, Weights
+from nmpcrl.study import paper
 
 
 @dataclass
@@ -111,6 +112,12 @@ def transition(controller):
         return Transition(state, np.array([-0.6, 1.0]), cost, after, solution)
 
     return build
+
+
+@pytest.fixture(scope="session")
+def robot() -> Nmpc:
+    """The paper's controller."""
+    return paper.nmpc()
 
 
 @pytest.fixture(scope="session")

@@ -7,29 +7,20 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
+from learning.small_runs import THETA, noise, run
 
 from nmpcrl.control import Ipopt, Nmpc, Plant, Problem, differential_drive
 from nmpcrl.control.solution import short
 from nmpcrl.learning import (
     Diverged,
-    Exploration,
     Weights,
     evaluate,
     expected_sarsa,
     frozen,
     gradient_tdc,
     q_learning,
-    train,
 )
 from nmpcrl.learning.training import absurd
-from nmpcrl.study import paper
-
-THETA = np.array(paper.THETA_INIT)
-
-
-@pytest.fixture(scope="module")
-def robot() -> Nmpc:
-    return paper.nmpc()
 
 
 @pytest.fixture(scope="module")
@@ -59,56 +50,53 @@ def filling(state, action, rng):
     return later, abs(state[0] - 1), later[0] > 0.9
 
 
-def noise(episodes, steps, inputs):
-    return Exploration.draw(np.random.default_rng(0), (episodes, steps, inputs), deviation=0.1)
+def cut(state, action, rng):
+    """The same, ended by its time alone."""
+    later, cost, _ = filling(state, action, rng)
+    return later, cost, False, later[0] > 0.3
 
 
-def test_the_plant_that_plans_is_the_environment_if_no_other_is_given(robot):
-    steps, same = (
-        list(train(expected_sarsa(robot, 1e-7), robot, Weights(THETA), noise(1, 5, 2), **how))
-        for how in ({}, {"plant": robot.plant, "start": robot.task.start})
-    )
-    for one, other in zip(steps, same, strict=True):
-        np.testing.assert_array_equal(one.weights.theta, other.weights.theta)
-        assert one.cost == other.cost
-
-
-def test_another_plant_is_charged_the_tasks_cost(robot):
-    slow = differential_drive(period=0.1)
-    rollout = evaluate(robot, THETA, 5, plant=slow)
-    np.testing.assert_array_equal(
-        rollout.states[1], slow.step(robot.task.start, rollout.actions[0])
-    )
-    assert rollout.costs[0] == robot.task.stage_cost(robot.task.start, rollout.actions[0])
+@pytest.mark.parametrize("plant", [None, differential_drive(), differential_drive(period=0.1)])
+def test_a_plant_is_charged_the_tasks_cost_and_is_by_default_what_plans(robot, plant):
+    advance, task = (plant or robot.plant).step, robot.task
+    rollout = evaluate(robot, THETA, 5, plant=plant)
+    later = [advance(s, a) for s, a in zip(rollout.states, rollout.actions, strict=True)]
+    np.testing.assert_array_equal(rollout.states, [task.start, *later[:-1]])
+    assert rollout.costs[0] == task.stage_cost(task.start, rollout.actions[0])
 
 
 def test_a_function_steps_charges_and_ends(tank):
-    theta = tank.problem.theta
-    rollout = evaluate(tank, theta, 50, plant=filling, start=[0.0], rng=3)
+    how = {"plant": filling, "start": [0.0], "rng": 3}
+    rollout, again = (evaluate(tank, tank.problem.theta, 50, **how) for _ in range(2))
     assert len(rollout.costs) < 50
     np.testing.assert_allclose(rollout.costs, np.abs(rollout.states[:, 0] - 1))
-    again = evaluate(tank, theta, 50, plant=filling, start=[0.0], rng=3)
     np.testing.assert_array_equal(rollout.states, again.states)
 
 
-def test_a_state_in_which_an_episode_ends_is_worth_nothing(tank):
-    weights, learner = Weights(tank.problem.theta), expected_sarsa(tank, 1e-3)
-    options = {"plant": filling, "start": lambda rng: rng.uniform(0, 0.5, 1), "rng": 1}
-    steps = list(train(learner, tank, weights, noise(3, 60, 1), **options))
-    last = [step for step in steps if step.end]
-    assert [step.episode for step in last] == [0, 1, 2]
-    assert len(steps) < 180
-    starts = {step.state[0] for step in steps if step.time == 0}
-    assert len(starts) == 3
+@pytest.mark.parametrize("plant", [filling, cut])
+def test_a_state_is_worth_nothing_where_an_episode_ends_but_not_where_its_time_does(tank, plant):
+    start = {"start": lambda rng: rng.uniform(0, 0.25, 1), "rng": 1}
+    steps = run(
+        expected_sarsa(tank, 1e-3), tank, noise(3, 60, 1, deviation=0.1), plant=plant, **start
+    )
+    last = [step for step in steps if step.last]
+    assert [(step.episode, step.end) for step in last] == [(k, plant is filling) for k in range(3)]
+    assert all(step.time < 59 for step in last)
+    assert len({step.state[0] for step in steps if step.time == 0}) == 3
     for step in last:
-        assert step.update.delta == pytest.approx(step.cost - step.solution.value)
+        worth = step.update.successor.value
+        assert (worth == 0) == step.end
+        assert step.update.delta == pytest.approx(step.cost + 0.9 * worth - step.solution.value)
+    assert len(evaluate(tank, tank.problem.theta, 60, plant=plant, **start).costs) < 60
 
 
 ONLY_PLANS = "a Problem plans, and says nothing of the environment"
 NO_STATE = r"^start .*; a state is 1 finite numbers"
 FILLING = {"plant": filling, "start": [0.0]}
 THREE = Plant(lambda s, a: [a, a, a], ("a", "b", "c"), ("u",), [-1], [1])
+SLOW = replace(differential_drive(), upper=[0.5, 1.5])
 NARROW = r"\[-0.6 .* and \[0.5 1.5\], and those of the plan between .* \[0.6    1.5708\]"
+TWO_STATES = FILLING | {"plant": lambda s, a, rng: ([1, 2], 0, False)}
 
 
 @pytest.mark.parametrize(
@@ -117,17 +105,9 @@ NARROW = r"\[-0.6 .* and \[0.5 1.5\], and those of the plan between .* \[0.6    
         ("tank", {"plant": filling}, ONLY_PLANS),
         ("tank", {"start": [0.0]}, ONLY_PLANS),
         ("tank", FILLING | {"plant": lambda state, action: 0}, r"plant is called as plant\(state"),
-        (
-            "tank",
-            FILLING | {"plant": lambda state, action, rng: state},
-            r"returns \(next state, cost, end\)",
-        ),
+        ("tank", FILLING | {"plant": lambda s, a, rng: s}, r"returns \(next state, cost, end\)"),
         ("tank", FILLING | {"plant": 5}, "plant is called as .* not a callable"),
-        (
-            "tank",
-            FILLING | {"plant": lambda s, a, rng: ([1, 2], 0, False)},
-            "a state is 1 finite numbers",
-        ),
+        ("tank", TWO_STATES, "a state is 1 finite numbers"),
         ("tank", FILLING | {"start": [np.nan]}, NO_STATE),
         ("tank", FILLING | {"start": [1.0, 2.0]}, NO_STATE),
         ("tank", FILLING | {"start": "here"}, NO_STATE),
@@ -138,7 +118,7 @@ NARROW = r"\[-0.6 .* and \[0.5 1.5\], and those of the plan between .* \[0.6    
             "data 'price' must be an array with an axis of",
         ),
         ("robot", {"plant": THREE}, "the plant has 3 states and 1 inputs, and the plan 3"),
-        ("robot", {"plant": replace(differential_drive(), upper=[0.5, 1.5])}, NARROW),
+        ("robot", {"plant": SLOW}, NARROW),
     ],
 )
 def test_what_is_no_environment_is_refused(request, name, options, message):
@@ -153,23 +133,20 @@ def test_what_is_no_environment_is_refused(request, name, options, message):
      (2e9, True, False), (1e9, False, False)],
 )  # fmt: skip
 def test_a_plant_that_runs_away_is_a_failed_solve(tank, later, end, ran):
-    def running(state, action, rng):
-        return np.array([later]), 0.5, end
-
-    how, theta = {"plant": running, "start": [0.1]}, tank.problem.theta
-    rollout = evaluate(tank, theta, 1, **how)
+    how = {"plant": lambda state, action, rng: (np.array([later]), 0.5, end), "start": [0.1]}
+    rollout = evaluate(tank, tank.problem.theta, 1, **how)
     assert (rollout.states, rollout.costs) == ([[0.1]], [0.5])
     assert (rollout.cost, bool(rollout.failure)) == ((np.inf, True) if ran else (0.5, False))
     if not ran:
         return
     assert re.search(rf"\[{re.escape(short(later))}\].* ran away", rollout.failure)
     for learner in (expected_sarsa(tank, 1e-3), q_learning(tank, 1e-3)):
-        steps = list(train(learner, tank, Weights(theta), noise(2, 3, 1), **how))
+        steps = run(learner, tank, noise(2, 3, 1), **how)
         assert [(s.episode, s.time, s.cost, s.last, s.failure) for s in steps] == [
             (k, 0, 0.5, True, rollout.failure) for k in range(2)
         ]
         with pytest.raises(Diverged, match=r"10 episodes in a row .* ran away"):
-            list(train(learner, tank, Weights(theta), noise(10, 3, 1), **how))
+            run(learner, tank, noise(10, 3, 1), **how)
 
 
 def test_a_plant_of_a_task_may_run_away_as_well(robot):
@@ -184,11 +161,10 @@ def test_an_error_inside_a_function_of_the_user_is_that_error(shop, broken):
     def fails(*given):
         raise TypeError("mine")
 
-    options = SELLING | {broken: fails}
     with pytest.raises(ValueError, match=f"^{broken} is called as {broken}"):
-        evaluate(shop, shop.problem.theta, 2, **options | {broken: lambda: None})
+        evaluate(shop, shop.problem.theta, 2, **SELLING | {broken: lambda: None})
     with pytest.raises(TypeError, match=r"^mine$"):
-        evaluate(shop, shop.problem.theta, 2, **options)
+        evaluate(shop, shop.problem.theta, 2, **SELLING | {broken: fails})
 
 
 class Overwriting:
@@ -197,6 +173,7 @@ class Overwriting:
     def __init__(self, *, careful):
         self.own = np.copy if careful else np.asarray
         self.state, self.price, self.asked = np.array([0.2]), np.zeros(4), []
+        self.world = {"plant": self.plant, "start": self.start, "data": self.data}
 
     def start(self, rng):
         self.state[:] = 0.2
@@ -220,32 +197,27 @@ class Overwriting:
 
 def test_functions_of_the_user_may_work_in_place(shop):
     theta, found = shop.problem.theta.copy(), []
-    for world in (Overwriting(careful=True), Overwriting(careful=False)):
-        for start in (world.start, np.array([0.2])):
-            how = {"plant": world.plant, "start": start, "data": world.data}
+    for careful in (True, False):
+        for start in ({}, {"start": np.array([0.2])}):
+            how = Overwriting(careful=careful).world | start
             ran = evaluate(shop, theta, 4, **how)
-            weights = Weights(theta)
-            steps = list(train(q_learning(shop, 1e-2), shop, weights, noise(2, 3, 1), **how))
-            found.append([ran.states, ran.actions])
-            found[-1] += [[s.state for s in steps], [s.action for s in steps]]
-            found[-1] += [[s.weights.theta for s in steps], [s.plan.data for s in steps]]
+            steps = run(q_learning(shop, 1e-2), shop, noise(2, 3, 1, deviation=0.1), **how)
+            rows = [(s.state, s.action, s.weights.theta, s.plan.data.ravel()) for s in steps]
+            found.append([*ran.states, *ran.actions, *map(np.concatenate, rows)])
     for other in found[1:]:
-        for one, same in zip(found[0], other, strict=True):
-            np.testing.assert_array_equal(one, same)
+        np.testing.assert_array_equal(np.concatenate(found[0]), np.concatenate(other))
     np.testing.assert_array_equal(theta, shop.problem.theta)
 
 
 def test_nothing_is_asked_of_a_time_before_its_turn(shop):
-    world = Overwriting(careful=True)
-    how = {"plant": world.plant, "start": world.start, "data": world.data}
-    weights = Weights(shop.problem.theta)
-    list(train(expected_sarsa(shop, 1e-3), shop, weights, noise(1, 3, 1), **how))
-    assert world.asked == [0, "plant", 1, "plant", 2, "plant", 3]
+    store = Overwriting(careful=True)
+    run(expected_sarsa(shop, 1e-3), shop, noise(1, 3, 1), **store.world)
+    assert store.asked == [0, "plant", 1, "plant", 2, "plant", 3]
 
 
 def test_an_int_seeds_another_stream_than_that_of_the_noise(tank):
     """Each draw of noise, of a plant in training and of one in a rollout is a number of its own."""
-    drawn, theta = [], tank.problem.theta
+    drawn = []
 
     def drawing(state, action, rng):
         drawn.append(rng.normal())
@@ -253,8 +225,8 @@ def test_an_int_seeds_another_stream_than_that_of_the_noise(tank):
 
     how = {"plant": drawing, "start": [0.1]}
     for rng in (0, np.int64(0), np.random.default_rng(0)):
-        list(train(frozen(tank), tank, Weights(theta), noise(1, 3, 1), **how, rng=rng))
-        evaluate(tank, theta, 3, **how, rng=rng)
+        run(frozen(tank), tank, noise(1, 3, 1), **how, rng=rng)
+        evaluate(tank, tank.problem.theta, 3, **how, rng=rng)
     one, same, given = np.reshape(drawn, (3, 6))
     np.testing.assert_array_equal(one, same)
     np.testing.assert_array_equal(given, np.random.default_rng(0).normal(size=6))
@@ -267,32 +239,12 @@ def test_theta_may_be_learned_as_large_as_it_is_solved_with():
         model=lambda x, u, th: 0.9 * x + 0.1 * u - 1e-12 * th["rate"] * x,
         stage=lambda x, u, th: ca.sumsqr(x) + ca.sumsqr(u),
     )  # fmt: skip
-    nmpc, weights = Nmpc(problem, solver=Ipopt()), Weights(problem.theta, np.array([1e10]))
+    nmpc = Nmpc(problem, solver=Ipopt())
     how = {"plant": lambda x, u, rng: (0.9 * x + 0.1 * u, x[0] ** 2, False), "start": [0.5]}
     for learner in (frozen(nmpc), gradient_tdc(nmpc, 1.0, 1.0)):
-        assert len(list(train(learner, nmpc, weights, noise(1, 3, 1), **how))) == 3
-    far = [
-        absurd(Weights(np.array([one]), weights.w), nmpc.largest) for one in (7e13, 8e13, np.nan)
-    ]
-    assert [bool(one) for one in far] == [False, True, True]
-
-
-def test_a_state_in_which_only_time_ends_an_episode_keeps_its_worth(tank):
-    def cut(state, action, rng):
-        later, cost, _ = filling(state, action, rng)
-        return later, cost, False, later[0] > 0.3
-
-    weights = Weights(tank.problem.theta)
-    noisy = noise(1, 60, 1)
-    steps = list(train(expected_sarsa(tank, 1e-3), tank, weights, noisy, plant=cut, start=[0.0]))
-    last = steps[-1]
-    assert len(steps) < 60
-    assert (last.end, last.last) == (False, True)
-    assert last.update.successor.value > 0
-    assert last.update.delta == pytest.approx(
-        last.cost + 0.9 * last.update.successor.value - last.solution.value
-    )
-    assert len(evaluate(tank, tank.problem.theta, 60, plant=cut, start=[0.0]).costs) < 60
+        assert len(run(learner, nmpc, noise(1, 3, 1), **how)) == 3
+    far = [Weights(np.array([one]), np.array([1e10])) for one in (7e13, 8e13, np.nan)]
+    assert [bool(absurd(one, nmpc.largest)) for one in far] == [False, True, True]
 
 
 def test_a_plan_sees_the_data_of_its_stages(shop):
@@ -300,9 +252,8 @@ def test_a_plan_sees_the_data_of_its_stages(shop):
     rollout = evaluate(shop, theta, 4, **SELLING)
     windows = [PRICES[[0, 1, 2, 3]], PRICES[1:], PRICES[[2, 3, 4, 4]], PRICES[[3, 4, 4, 4]]]
     for state, action, prices in zip(rollout.states, rollout.actions, windows, strict=True):
-        np.testing.assert_allclose(
-            action, shop.solve(state, theta, data={"price": prices}).action, atol=1e-6
-        )
+        plan = shop.solve(state, theta, data={"price": prices})
+        np.testing.assert_allclose(action, plan.action, atol=1e-6)
     told = {"data": lambda t: {"price": windows[t] if t < 4 else 0.0}}
     same = evaluate(shop, theta, 4, **SELLING | told)
     np.testing.assert_array_equal(rollout.actions, same.actions)
@@ -310,9 +261,8 @@ def test_a_plan_sees_the_data_of_its_stages(shop):
 
 @pytest.mark.parametrize("constrained", [False, True])
 def test_the_next_state_is_valued_with_the_data_of_the_next_time(shop, constrained):
-    weights, es = Weights(shop.problem.theta), expected_sarsa(shop, 1e-3)
-    steps = list(train(es, shop, weights, noise(2, 3, 1), constrained=constrained, **SELLING))
-    for step, later in pairwise(steps):
+    es, how = expected_sarsa(shop, 1e-3), SELLING | {"constrained": constrained}
+    for step, later in pairwise(run(es, shop, noise(2, 3, 1, deviation=0.1), **how)):
         if not step.last:
             seen = step.update.successor.solution.data
             np.testing.assert_array_equal(seen[:, 0], later.plan.data[:, 0])

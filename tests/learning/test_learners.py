@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from nmpcrl.control import SolverError
 from nmpcrl.learning import (
     Imitation,
     Learner,
@@ -39,27 +38,19 @@ DELTA = 4.0 + 0.9 * 1.5 + 1.0
 OVERLAP = 0.1 + 0.6  # w'phi
 ES = THETA + ALPHA * DELTA * PHI
 GES = THETA + ALPHA * (DELTA * PHI - 0.9 * OVERLAP * PHI_NEXT)
-LENGTH = np.linalg.norm(GES - THETA)
+MATCHED = THETA + np.linalg.norm(GES - THETA) * (ES - THETA) / np.linalg.norm(ES - THETA)
 DEEP = THETA + ALPHA * (4.0 + 0.9 * 7.0 + 1.0) * PHI  # by the network's answer
-DEEP_MAKERS = (deep_expected_sarsa, regularized_deep_expected_sarsa)
-
-MAKERS = {
-    "ES": lambda c, _: expected_sarsa(c, ALPHA),
-    "DES": lambda c, n: deep_expected_sarsa(c, n, ALPHA),
-    "RDES": lambda c, n: regularized_deep_expected_sarsa(c, n, ALPHA),
-    "GES": lambda c, _: gradient_expected_sarsa(c, ALPHA, BETA),
-    "TDC": lambda c, _: gradient_tdc(c, ALPHA, BETA),
-    "QL": lambda c, _: q_learning(c, ALPHA),
-    "frozen": lambda c, _: frozen(c),
-    "matched": lambda c, _: step_matched(c, ALPHA, BETA),
-    "random": lambda c, _: random_direction(c, ALPHA, np.random.default_rng(0)),
-}
-SOLVING = ("ES", "GES", "TDC", "QL", "matched", "random")
 MOVED_W = W + BETA * (DELTA - OVERLAP) * PHI
-
-
-def at_random(controller, seed=0):
-    return random_direction(controller, ALPHA, np.random.default_rng(seed))
+BY_HAND = {  # name: learner, theta and w after the step, TD error
+    "ES": (lambda c, _: expected_sarsa(c, ALPHA), ES, W, DELTA),
+    "QL": (lambda c, _: q_learning(c, ALPHA), ES, W, DELTA),
+    "DES": (lambda c, n: deep_expected_sarsa(c, n, ALPHA), DEEP, W, 11.3),
+    "RDES": (lambda c, n: regularized_deep_expected_sarsa(c, n, ALPHA), DEEP, W, 11.3),
+    "GES": (lambda c, _: gradient_expected_sarsa(c, ALPHA, BETA), GES, MOVED_W, DELTA),
+    "TDC": (lambda c, _: gradient_tdc(c, ALPHA, BETA), GES, MOVED_W, DELTA),  # V is linear
+    "matched": (lambda c, _: step_matched(c, ALPHA, BETA), MATCHED, MOVED_W, DELTA),
+    "frozen": (lambda c, _: frozen(c), THETA, W, None),
+}
 
 
 def moved(learner, weights, transition):
@@ -67,84 +58,51 @@ def moved(learner, weights, transition):
     return learner.step(weights, transition).weights.theta - weights.theta
 
 
-@pytest.mark.parametrize(
-    ("name", "theta", "w"),
-    [
-        ("ES", ES, W),
-        ("QL", ES, W),
-        ("DES", DEEP, W),
-        ("RDES", DEEP, W),
-        ("GES", GES, MOVED_W),
-        ("TDC", GES, MOVED_W),  # the value is linear
-        ("matched", THETA + LENGTH * (ES - THETA) / np.linalg.norm(ES - THETA), MOVED_W),
-        ("frozen", THETA, W),
-    ],
-)
-def test_a_step_by_hand(controller, network, transition, weights, name, theta, w):
+@pytest.mark.parametrize("name", BY_HAND)
+def test_a_step_by_hand(controller, network, transition, weights, name):
     """It is pure, too, and a learner goes on from a copy and a pickle of it and of its weights."""
     network.batch = 1
-    learner, step = MAKERS[name](controller, network), transition(THETA)
+    make, theta, w, delta = BY_HAND[name]
+    learner, step = make(controller, network), transition(THETA)
     assert (learner.name, learner.gamma) == (name, controller.gamma)
     for one in (learner, learner, copy.deepcopy(learner), pickle.loads(pickle.dumps(learner))):
         assert one.rule.moves == learner.rule.moves
         update = one.step(weights, step)
-        np.testing.assert_allclose(update.weights.theta, theta)
-        np.testing.assert_allclose(update.weights.w, w)
-    np.testing.assert_array_equal(weights.theta, THETA)
-    np.testing.assert_array_equal(weights.w, W)
-    np.testing.assert_array_equal(step.solution.features, PHI)
-    again = pickle.loads(pickle.dumps(update.weights))
-    for one in (copy.deepcopy(update.weights), again, Weights(again.theta, again.w)):
-        np.testing.assert_array_equal(
-            learner.step(one, step).weights.theta, learner.step(update.weights, step).weights.theta
-        )
-    assert update.delta == pytest.approx(
-        {"frozen": None, "DES": 11.3, "RDES": 11.3}.get(name, DELTA)
+        np.testing.assert_allclose([update.weights.theta, update.weights.w], [theta, w])
+    assert update.delta == pytest.approx(delta)
+    given = weights.theta, weights.w, step.solution.features
+    np.testing.assert_array_equal(given, [THETA, W, PHI])
+    again, expected = (
+        pickle.loads(pickle.dumps(update.weights)),
+        moved(learner, update.weights, step),
     )
+    for one in (copy.deepcopy(update.weights), again, Weights(again.theta, again.w)):
+        np.testing.assert_array_equal(moved(learner, one, step), expected)
 
 
 def test_weights_begin_with_w_zero_if_none_is_given(controller, transition):
-    step, learner = transition(THETA), gradient_expected_sarsa(controller, ALPHA, BETA)
-    bare, zero = (learner.step(w, step) for w in (Weights(THETA), Weights(THETA, np.zeros(3))))
-    np.testing.assert_allclose(bare.weights.theta, ES)  # whose w'phi is 0
-    np.testing.assert_array_equal(bare.weights.w, zero.weights.w)
-    assert bare.weights.w.any()
     np.testing.assert_array_equal(Weights(THETA).w, np.zeros(3))
+    learner = gradient_expected_sarsa(controller, ALPHA, BETA)
+    first = learner.step(Weights(THETA), transition(THETA)).weights
+    np.testing.assert_allclose([first.theta, first.w], [ES, BETA * DELTA * PHI])
 
 
-@pytest.mark.parametrize("name", ["DES", "RDES"])
-def test_a_gated_learner_does_not_move_before_its_network_is_ready(
-    controller, network, transition, weights, name
+@pytest.mark.parametrize(
+    ("make", "inputs"), [(deep_expected_sarsa, 5), (regularized_deep_expected_sarsa, 8)]
+)
+def test_a_deep_learner_moves_once_its_network_is_ready_and_has_the_options_of_imitation(
+    controller, network, transition, weights, make, inputs
 ):
-    learner = MAKERS[name](controller, network)
-    assert isinstance(learner.bootstrap, Imitation)
-    assert learner.bootstrap.with_theta == (name == "RDES")
-    first, second, third = (learner.step(weights, transition(THETA)) for _ in range(3))
-    assert first.weights is weights
-    assert second.weights is weights
-    assert (first.delta, first.successor) == (None, None)
-    assert third.delta is not None
-    assert controller.calls == []
-
-
-@pytest.mark.parametrize("make", DEEP_MAKERS)
-def test_options_of_a_deep_learner_are_those_of_imitation(
-    controller, network, transition, weights, make
-):
-    literal = make(controller, network, ALPHA, gated=False).step(weights, transition(THETA))
+    learner, one = make(controller, network, ALPHA, fits=4), transition(THETA)
+    first, second, third = (learner.step(weights, one) for _ in range(3))
+    assert first.weights is second.weights is weights
+    assert (first.delta, first.successor, network.fits) == (None, None, 4)
+    np.testing.assert_allclose(third.weights.theta, DEEP)
+    assert [asked.size for asked in network.asked] == [inputs]
+    network.batch = 9
+    literal = make(controller, network, ALPHA, gated=False).step(weights, one)
     np.testing.assert_allclose(literal.weights.theta, DEEP)
-    network.batch = 1
-    make(controller, network, ALPHA, fits=4).step(weights, transition(THETA))
-    assert network.fits == 4
-
-
-@pytest.mark.parametrize("name", SOLVING)
-def test_the_next_action_is_the_policys_own(controller, network, transition, weights, name):
-    """The next state is solved with u_0 free, even where the value learned has it fixed."""
-    step = transition(THETA)
-    MAKERS[name](controller, network).step(weights, step)
-    ((state, theta, _, action),) = controller.calls
-    assert (state is step.next_state, theta is weights.theta, action) == (True, True, None)
+    assert controller.calls == []
 
 
 def test_frozen_asks_for_nothing(controller, transition, weights):
@@ -164,27 +122,12 @@ def test_what_is_no_rule_and_a_bootstrap_that_does_not_fit_are_refused(
         mismatched.step(weights, transition(THETA))
 
 
-def test_a_failed_second_solve_is_the_callers_to_judge(transition, weights):
-    def fail(state, theta, _):
-        raise SolverError("no optimum", state, theta)
-
-    with pytest.raises(SolverError):
-        expected_sarsa(SimpleNamespace(gamma=0.9, solve=fail), ALPHA).step(
-            weights, transition(THETA)
-        )
-
-
-@pytest.mark.parametrize(
-    "make",
-    [lambda c: expected_sarsa(c, ALPHA), lambda c: gradient_expected_sarsa(c, ALPHA, BETA), lstd_q],
-)
+@pytest.mark.parametrize("make", [BY_HAND["ES"][0], BY_HAND["GES"][0], lambda c, _: lstd_q(c)])
 def test_nothing_is_learned_from_an_episode_that_failed(controller, transition, weights, make):
-    learner = make(controller)
-    moved = learner.step(weights, transition(THETA)).weights
-    for before in (weights, moved):
+    learner = make(controller, None)
+    for before in (weights, learner.step(weights, transition(THETA)).weights):
         after = learner.interrupted(before)
-        np.testing.assert_array_equal(after.theta, before.theta)
-        np.testing.assert_array_equal(after.w, before.w)
+        np.testing.assert_array_equal([after.theta, after.w], [before.theta, before.w])
 
 
 def test_a_rule_of_ones_own_has_a_memory_and_is_told_of_an_episode_that_failed(
@@ -196,16 +139,13 @@ def test_a_rule_of_ones_own_has_a_memory_and_is_told_of_an_episode_that_failed(
         velocity = 0.5 * velocity + ALPHA * delta * transition.solution.features
         return theta + velocity, velocity
 
-    rule = UpdateRule(
-        step, lambda weights: 0 * weights.theta, lambda theta, velocity: (theta, 0 * velocity)
-    )
+    rule = UpdateRule(step, lambda first: 0 * first.theta, lambda theta, v: (theta, 0 * v))
     learner, one = Learner("own", SecondSolve(controller), rule, 0.9), transition(THETA)
     first = learner.step(weights, one).weights
     np.testing.assert_allclose(first.theta, ES)
-    np.testing.assert_allclose(
-        moved(learner, first, one),
-        0.5 * (ES - THETA) + ALPHA * learner.step(first, one).delta * PHI,
-    )
+    second = learner.step(first, one)
+    expected = first.theta + 0.5 * (ES - THETA) + ALPHA * second.delta * PHI
+    np.testing.assert_allclose(second.weights.theta, expected)
     np.testing.assert_array_equal(learner.interrupted(first).memory, np.zeros(3))
     np.testing.assert_array_equal(first.w, W)
     bounded = replace(learner, bounds=(np.full(3, -1.5), np.ones(3)))
@@ -227,18 +167,17 @@ def test_learners_can_be_pickled(controller, make):
     assert again.name == make(controller).name
 
 
-@pytest.mark.parametrize("cost", [4.0, -9.0])
-def test_matched_goes_where_es_goes_and_stays_where_that_has_no_direction(
-    controller, transition, weights, cost
+def test_matched_is_as_long_as_ges_in_the_direction_of_es_and_stays_where_that_has_none(
+    controller, transition, weights
 ):
-    step, es = transition(THETA, cost=cost), expected_sarsa(controller, ALPHA)
-    matched = moved(step_matched(controller, ALPHA, BETA), weights, step)
-    length = np.linalg.norm(moved(gradient_expected_sarsa(controller, ALPHA, BETA), weights, step))
-    there = moved(es, weights, step)
-    np.testing.assert_allclose(matched, length * there / np.linalg.norm(there))
+    es, matched = expected_sarsa(controller, ALPHA), step_matched(controller, ALPHA, BETA)
+    ges, step = gradient_expected_sarsa(controller, ALPHA, BETA), transition(THETA, cost=-9.0)
+    length, there = np.linalg.norm(moved(ges, weights, step)), moved(es, weights, step)
+    expected = length * there / np.linalg.norm(there)
+    np.testing.assert_allclose(moved(matched, weights, step), expected)
     still, nowhere = Weights(np.zeros(3), W), transition(np.zeros(3), cost=0.0)  # every value is 0
-    assert moved(gradient_expected_sarsa(controller, ALPHA, BETA), still, nowhere).any()
-    assert not moved(step_matched(controller, ALPHA, BETA), still, nowhere).any()
+    assert moved(ges, still, nowhere).any()
+    assert not moved(matched, still, nowhere).any()
 
 
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1), (1, -1, 0)])
@@ -246,7 +185,8 @@ def test_random_steps_are_as_long_as_those_of_es_and_favour_no_direction(
     controller, transition, weights, axis
 ):
     """Archimedes: on a sphere, the component along any axis is uniform between -1 and 1."""
-    step, learner = transition(THETA), at_random(controller)
+    step = transition(THETA)
+    learner = random_direction(controller, ALPHA, np.random.default_rng(0))
     steps = np.array([moved(learner, weights, step) for _ in range(4000)])
     lengths = np.linalg.norm(steps, axis=1, keepdims=True)
     np.testing.assert_allclose(lengths, np.linalg.norm(ES - THETA))
@@ -255,16 +195,14 @@ def test_random_steps_are_as_long_as_those_of_es_and_favour_no_direction(
 
 
 def test_random_directions_come_from_the_given_generator_alone(controller, transition, weights):
-    step = transition(THETA)
-
-    def path(learner):
-        return [moved(learner, weights, step).tolist() for _ in range(3)]
-
-    learner = at_random(controller, 5)
-    first = path(copy.deepcopy(learner))
-    assert path(learner) == first == path(at_random(controller, 5))
-    assert path(at_random(controller, 6)) != first
-    assert first[0] != first[1]
+    learners = [random_direction(controller, ALPHA, np.random.default_rng(k)) for k in (5, 5, 6)]
+    learners.append(copy.deepcopy(learners[0]))
+    one, same, other, copied = (
+        [moved(learner, weights, transition(THETA)).tolist() for _ in range(3)]
+        for learner in learners
+    )
+    assert one == same == copied != other
+    assert one[0] != one[1]
 
 
 class Bandit:
@@ -291,12 +229,7 @@ def test_q_learning_finds_the_value_of_every_action_from_random_ones():
 
 
 @pytest.mark.parametrize(
-    "make",
-    [
-        lambda c: expected_sarsa(c, 0.5),
-        lambda c: gradient_expected_sarsa(c, 0.4, 0.4),
-        lambda c: gradient_tdc(c, 0.4, 0.4, projection=(0.0, 100.0)),
-    ],
+    "make", [lambda c: expected_sarsa(c, 0.5), lambda c: gradient_expected_sarsa(c, 0.4, 0.4)]
 )
 def test_learning_settles_at_the_bellman_equations_solution(controller, make):
     """Three states in a ring with costs 1, 2, 3; the features tell them apart, so V is exact."""

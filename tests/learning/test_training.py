@@ -1,29 +1,19 @@
 """Algorithm 1 as a generator, what a failed solve means, and the rollout without noise."""
 
-import dataclasses
-import re
-from itertools import pairwise
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from learning.small_runs import THETA, noise, run
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning import UpdateRule, Weights, expected_sarsa, frozen, q_learning
 from nmpcrl.learning.learners import Auxiliary, first_w
 from nmpcrl.learning.rollout import evaluate
-from nmpcrl.learning.training import (
-    PATIENCE,
-    Diverged,
-    Exploration,
-    count_episodes,
-    count_steps,
-    train,
-)
+from nmpcrl.learning.training import Diverged, Exploration, train
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.learners import DECAYS
 from nmpcrl.study.setup import prepare
-
-THETA = np.array(paper.THETA_INIT)
 
 
 class Faulty(Nmpc):
@@ -41,29 +31,6 @@ class Faulty(Nmpc):
         return super().solve(state, theta, warm_start, action)
 
 
-@pytest.fixture(scope="module")
-def sound() -> Nmpc:
-    return paper.nmpc()
-
-
-def first_weights():
-    return Weights(THETA.copy(), np.full(9, paper.W_INIT))
-
-
-def quiet(episodes, steps):
-    """No exploration at all."""
-    return Exploration(np.zeros((episodes, steps, 2)), np.ones((episodes, steps)))
-
-
-def noisy(episodes, steps, scale=1.0):
-    noise = np.random.default_rng(0).normal(size=(episodes, steps, 2))
-    return Exploration(noise, np.full((episodes, steps), scale))
-
-
-def training(controller, explore, make=frozen):
-    return list(train(make(controller), controller, first_weights(), explore))
-
-
 def es(controller):
     return expected_sarsa(controller, paper.ALPHA)
 
@@ -72,339 +39,216 @@ def places(steps):
     return [(step.episode, step.time) for step in steps]
 
 
-def test_steps_come_in_order_and_every_episode_begins_at_the_start(sound):
-    steps = training(sound, noisy(3, 4))
-    assert places(steps) == [(e, t) for e in range(3) for t in range(4)]
-    for step in steps:
-        assert np.array_equal(step.state, sound.task.start) == (step.time == 0)
-
-
-def test_a_step_is_the_plants_and_costs_what_the_task_says(sound):
-    plant, task = sound.plant, sound.task
-    steps = training(sound, noisy(1, 6), es)
-    for now, later in pairwise(steps):
-        np.testing.assert_array_equal(plant.step(now.state, now.action), later.state)
-    for step in steps:
-        assert step.cost == task.stage_cost(step.state, step.action)
-
-
-def test_the_action_is_the_policys_with_noise_and_clipped(sound):
-    explore, plant = noisy(2, 5, scale=0.7), sound.plant
-    clipped = 0
-    for step in training(sound, explore):
-        wish = step.solution.action + 0.7 * explore.noise[step.episode, step.time]
+def test_steps_are_those_of_algorithm_1(robot):
+    plant, task, weights, clipped = robot.plant, robot.task, Weights(THETA), 0
+    explore = Exploration(noise(2, 5).noise, np.full((2, 5), 0.7))
+    steps = run(es(robot), robot, explore)
+    assert places(steps) == [(e, t) for e in range(2) for t in range(5)]
+    for k, step in enumerate(steps):
+        before = steps[k - 1]
+        expected = plant.step(before.state, before.action) if step.time else task.start
+        np.testing.assert_array_equal(step.state, expected)
+        wish = step.plan.action + 0.7 * explore.noise[step.episode, step.time]
         np.testing.assert_allclose(step.action, np.clip(wish, plant.lower, plant.upper))
         clipped += not np.array_equal(step.action, wish)
+        assert step.cost == task.stage_cost(step.state, step.action)
+        assert step.solution is step.plan
+        np.testing.assert_array_equal(step.solution.theta, weights.theta)
+        moved = weights.theta + paper.ALPHA * step.update.delta * step.solution.features
+        np.testing.assert_allclose(step.weights.theta, moved, rtol=1e-14)
+        weights = step.weights
     assert clipped > 0
+    assert not np.array_equal(weights.theta, THETA)
 
 
-def test_an_action_that_is_not_clipped_is_the_wish(sound):
-    explore = noisy(1, 8)
-    steps = list(train(frozen(sound), sound, first_weights(), explore, clipped=False))
+def test_an_action_that_is_not_clipped_is_the_wish_and_frozen_weights_never_move(robot):
+    explore = noise(1, 8)
+    steps = run(frozen(robot), robot, explore, clipped=False)
     for step in steps:
         wish = step.solution.action + explore.noise[step.episode, step.time]
         np.testing.assert_array_equal(step.action, wish)
-    assert any((np.abs(step.action) > sound.plant.upper).any() for step in steps)
+        np.testing.assert_array_equal(step.weights.theta, THETA)
+    assert any((np.abs(step.action) > robot.plant.upper).any() for step in steps)
 
 
-def test_where_actions_are_valued_the_solution_has_the_applied_action_first(sound):
-    weights = first_weights()
-    steps = train(es(sound), sound, weights, noisy(2, 5), constrained=True)
-    for step in steps:
+def test_where_actions_are_valued_the_solution_has_the_applied_action_first(robot):
+    theta = THETA
+    for step in run(es(robot), robot, noise(2, 5), constrained=True):
         np.testing.assert_allclose(step.solution.action, step.action, atol=1e-12)
-        afresh = sound.solve(step.state, weights.theta, None, step.action)
-        assert step.solution.value == pytest.approx(afresh.value, rel=1e-6)
-        assert step.solution.value >= step.plan.value - 1e-6
-        free = sound.solve(step.state, weights.theta)
+        fixed, free = (robot.solve(step.state, theta, None, a) for a in (step.action, None))
+        assert step.solution.value == pytest.approx(fixed.value, rel=1e-6)
         assert step.plan.value == pytest.approx(free.value, rel=1e-6)
-        weights = step.weights
+        theta = step.weights.theta
 
 
-def test_where_states_are_valued_the_solution_is_the_plan(sound):
-    assert all(step.solution is step.plan for step in training(sound, noisy(1, 5), es))
-
-
-def test_a_learner_of_action_values_gets_them_unless_told_otherwise(sound):
-    learner = q_learning(sound, paper.ALPHA)
+def test_a_learner_of_action_values_gets_them_unless_told_otherwise(robot):
+    learner = q_learning(robot, paper.ALPHA)
     for told, valued in (({}, True), ({"constrained": False}, False)):
-        for step in train(learner, sound, first_weights(), noisy(1, 3), **told):
-            assert (step.solution is not step.plan) == valued
+        steps = run(learner, robot, noise(1, 3), **told)
+        assert [step.solution is not step.plan for step in steps] == [valued] * 3
+
+
+def call(robot, **options):
+    given = {"learner": q_learning(robot, 1e-7), "controller": robot, "explore": noise(1, 3)}
+    return train(**{"weights": Weights(THETA)} | given | options)
 
 
 @pytest.mark.parametrize(
-    ("noise", "scale"), [((2, 5), (2, 5)), ((2, 5, 2), (2,)), ((2, 5, 2), (2, 4))]
-)
-def test_noise_of_another_shape_is_refused_with_it(noise, scale):
-    with pytest.raises(ValueError, match=rf"{re.escape(str(noise))}.* \(episodes, steps, inputs\)"):
-        Exploration(np.zeros(noise), np.ones(scale))
-
-
-def test_noise_for_another_number_of_inputs_is_refused(sound):
-    explore = Exploration(np.zeros((1, 3, 1)), np.ones((1, 3)))
-    with pytest.raises(ValueError, match="1 numbers a step; the NMPC has 2 inputs"):
-        next(train(frozen(sound), sound, first_weights(), explore))
-
-
-@pytest.mark.parametrize(
-    ("given", "options", "message"),
+    ("refused", "message"),
     [
-        (THETA, {}, r"weights = array.* must be Weights: write Weights\(theta\)"),
-        (None, {"clipped": False}, r"clipped = False .* \[0.6    1.5708\].* QL has no Q\(s, a\)"),
-        (None, {"controller": 5}, "controller = 5 must be an Nmpc"),
+        (lambda _: Exploration(np.zeros((2, 5)), np.ones((2, 5))), r"\(2, 5\) .*\(episodes, steps"),
+        (lambda _: Exploration(np.zeros((2, 5, 2)), np.ones(2)), r"scale \(2,\): .*\(episodes"),
+        (lambda _: Exploration(np.zeros((2, 5, 2)), np.ones((2, 4))), r"scale \(2, 4\): .*\(epis"),
+        (
+            lambda nmpc: call(nmpc, explore=noise(1, 3, 1)),
+            "1 numbers a step; the NMPC has 2 inputs",
+        ),
+        (
+            lambda nmpc: call(nmpc, weights=THETA),
+            r"weights = array.* must be Weights: write Weights\(the",
+        ),
+        (lambda nmpc: call(nmpc, clipped=False), r"clipped = .* \[0.6    1.5708\].* QL has no Q\("),
+        (lambda nmpc: call(nmpc, controller=5), "controller = 5 must be an Nmpc"),
     ],
 )
-def test_what_cannot_be_trained_is_refused_at_the_call(sound, given, options, message):
-    given = first_weights() if given is None else given
-    what = {"learner": q_learning(sound, 1e-7), "controller": sound} | options
+def test_what_cannot_be_trained_is_refused_at_the_call(robot, refused, message):
     with pytest.raises(ValueError, match=message):
-        train(weights=given, explore=noisy(1, 3), **what)
+        refused(robot)
 
 
-def test_weights_may_be_lists_and_are_left_as_they_are(sound):
+def test_weights_may_be_lists_and_are_left_as_they_are(robot):
     def in_place(theta, memory, *_):
         theta[:] += 1.0
         return theta, memory
 
     given = Weights(THETA.tolist(), [0.0] * 9)
-    learner = dataclasses.replace(es(sound), rule=UpdateRule(in_place))
-    *_, last = train(learner, sound, given, noisy(1, 3))
+    learner = replace(es(robot), rule=UpdateRule(in_place))
+    *_, last = train(learner, robot, given, noise(1, 3))
     np.testing.assert_array_equal(last.weights.theta, THETA + 3)
     assert given.theta == THETA.tolist()
 
 
-def test_weights_go_from_step_to_step_and_from_episode_to_episode(sound):
-    weights = first_weights()
-    for step in training(sound, noisy(2, 4), es):
-        np.testing.assert_array_equal(step.solution.theta, weights.theta)
-        moved = weights.theta + paper.ALPHA * step.update.delta * step.solution.features
-        np.testing.assert_allclose(step.weights.theta, moved, rtol=1e-14)
-        weights = step.weights
-    assert not np.array_equal(weights.theta, THETA)
-
-
-def test_frozen_weights_never_move(sound):
-    for step in training(sound, noisy(2, 4)):
-        np.testing.assert_array_equal(step.weights.theta, THETA)
-
-
-def test_training_can_be_stopped_at_any_step(sound):
-    steps = train(frozen(sound), sound, first_weights(), noisy(1000, 130))
-    assert places([next(steps), next(steps)]) == [(0, 0), (0, 1)]
-    steps.close()
-
-
-def test_the_second_solve_is_the_next_first_ones_warm_start():
-    """It was solved in that very state, so nothing is shifted, and little is left to do."""
+def test_a_solve_in_the_state_itself_is_the_next_warm_start_and_else_the_plan_before():
     controller = Faulty(lambda call: False)
-    steps = training(controller, noisy(1, 4), es)
-    warm_starts = controller.warm_starts
-    assert warm_starts[0] is None
-    for k, step in enumerate(steps):
-        assert warm_starts[2 * k + 1] is step.solution
-        if k + 1 < len(steps):
-            assert warm_starts[2 * k + 2] is step.update.successor.solution
-
-
-def test_without_a_second_solve_the_plan_itself_is_the_next_warm_start():
-    controller = Faulty(lambda call: False)
-    steps = training(controller, noisy(2, 3))
-    plans = [step.solution for step in steps]
+    expected = []
+    for step in run(es(controller), controller, noise(1, 4)):
+        expected += [step.solution, step.update.successor.solution]
+    assert controller.warm_starts == [None, *expected[:-1]]
+    controller.warm_starts.clear()
+    plans = [step.solution for step in run(frozen(controller), controller, noise(2, 3))]
     assert controller.warm_starts == [None, *plans[:2], None, *plans[3:5]]
 
 
-def test_the_step_reading_counts_time_through_training():
-    np.testing.assert_array_equal(count_steps(3, 4), [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11]])
+@pytest.mark.parametrize("decay", DECAYS)
+def test_noise_is_standard_normal_and_shrinks_by_the_rate_each_count(robot, decay):
+    experiment = Experiment(decay=decay, episodes=200, steps=130, decay_rate=0.999)
+    explore, (e, t) = prepare(experiment, robot)[2], np.indices((200, 130))
+    np.testing.assert_allclose(explore.scale, 0.999 ** {"step": 130 * e + t, "episode": e}[decay])
+    assert explore.noise.shape == (200, 130, 2)
+    assert explore.noise.mean() == pytest.approx(0, abs=0.02)
+    assert explore.noise.std() == pytest.approx(1, abs=0.02)
 
 
-def test_the_episode_reading_counts_episodes():
-    np.testing.assert_array_equal(count_episodes(3, 4), [[0] * 4, [1] * 4, [2] * 4])
-
-
-@pytest.mark.parametrize("decay", list(DECAYS))
-def test_exploration_shrinks_by_the_rate_each_count(sound, decay):
-    experiment = Experiment(decay=decay, episodes=3, steps=4, decay_rate=0.5)
-    scale = prepare(experiment, sound)[2].scale
-    by_hand = [
-        [0.5 ** {"step": 4 * e + t, "episode": e}[decay] for t in range(4)] for e in range(3)
-    ]
-    np.testing.assert_allclose(scale, by_hand)
-
-
-def test_noise_is_standard_normal(sound):
-    noise = prepare(Experiment(episodes=200, steps=130), sound)[2].noise
-    assert noise.shape == (200, 130, 2)
-    assert noise.mean() == pytest.approx(0, abs=0.02)
-    assert noise.std() == pytest.approx(1, abs=0.02)
-
-
-def test_a_solve_that_fails_ends_the_episode_and_learning_goes_on():
-    controller = Faulty(lambda call: call == 2)
-    steps = training(controller, quiet(2, 4))
-    assert places(steps) == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (1, 3)]
-    failed = steps[2]
-    assert "call 2 failed" in failed.failure
-    assert failed.solution is None
-    assert failed.update is None
-    assert np.isnan(failed.action).all()
-    assert np.isnan(failed.cost)
-    np.testing.assert_array_equal(steps[3].state, controller.task.start)
-    assert [bool(step.failure) for step in steps] == [False, False, True] + [False] * 4
-
-
-def test_a_second_solve_that_fails_ends_the_episode_and_keeps_theta():
-    # the calls are V(s0), V(s1), V(s1), V(s2), which fails
-    controller = Faulty(lambda call: call == 3)
-    steps = training(controller, quiet(2, 3), es)
-    assert places(steps) == [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)]
-    failed = steps[1]
-    assert failed.failure
-    assert failed.solution is not None
-    assert failed.update is None
-    assert np.isfinite(failed.cost)
-    np.testing.assert_array_equal(failed.weights.theta, steps[0].weights.theta)
-    np.testing.assert_array_equal(steps[2].solution.theta, steps[0].weights.theta)
-
-
-@pytest.mark.parametrize("failing", [2, 3])  # a plan, or the solve after it
-def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing):
-    told = []
+@pytest.mark.parametrize("failing", [2, 3])  # the plan at t = 1, or the second solve after it
+def test_a_solve_that_fails_ends_the_episode_and_learning_goes_on(failing):
+    told, controller = [], Faulty(lambda call: call == failing)
 
     def step(theta, memory, transition, delta, successor):
         told.append(transition.first)
         return theta, memory
 
     rule = UpdateRule(step, interrupted=lambda theta, memory: (1.01 * theta, memory))
-
-    controller = Faulty(lambda call: call == failing)
-    steps = training(controller, quiet(2, 3), lambda c: dataclasses.replace(es(c), rule=rule))
+    steps = run(replace(es(controller), rule=rule), controller, noise(2, 3))
+    assert places(steps) == [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)]
     assert told == [True, True, False, False]
-    failed = next(k for k, step in enumerate(steps) if step.failure)
-    for step in steps[failed:]:
+    _, failed, begun, *_ = steps
+    assert [f"call {failing} failed" in step.failure for step in steps] == [
+        False,
+        True,
+        *[False] * 3,
+    ]
+    assert [step.last for step in steps] == [False, True, False, False, True]
+    assert failed.update is None
+    acted = failing == 3
+    assert (failed.solution is not None, np.isfinite(failed.cost)) == (acted, acted)
+    assert np.isfinite(failed.action).all() == acted
+    np.testing.assert_array_equal(begun.state, controller.task.start)
+    for step in steps[1:]:
         np.testing.assert_array_equal(step.weights.theta, 1.01 * THETA)
 
 
 def test_ten_failed_episodes_in_a_row_are_a_divergence():
-    controller = Faulty(lambda call: True)
-    steps = []
-    with pytest.raises(Diverged, match="10 episodes in a row ended in a failed solve: call 9 fail"):
-        steps.extend(train(frozen(controller), controller, first_weights(), quiet(30, 4)))
-    assert places(steps) == [(e, 0) for e in range(PATIENCE)]
-
-
-def test_ten_failed_episodes_not_in_a_row_are_none():
-    """Nine fail at once, the tenth goes through, and nine more fail."""
-    fails = [True] * 9 + [False] * 2 + [True] * 9
-    controller = Faulty(lambda call: fails[call])
-    steps = training(controller, quiet(19, 2))
-    assert places(steps)[-1] == (18, 0)
-
-
-def leap(spoil):
-    """A learner that spoils theta and w in its third step."""
-    count = 0
-
-    def step(theta, memory, *_):
-        nonlocal count
-        count += 1
-        return spoil(theta, memory) if count == 3 else (theta, memory)
-
-    return lambda controller: dataclasses.replace(es(controller), rule=UpdateRule(step, first_w))
+    """Nine fail at once, the tenth goes through, and ten more fail."""
+    controller, steps = Faulty(lambda call: call not in (9, 10)), []
+    with pytest.raises(Diverged, match="10 episodes in a row ended in a failed solve: call 20 fa"):
+        steps.extend(train(frozen(controller), controller, Weights(THETA), noise(30, 2)))
+    assert places(steps) == [*((e, 0) for e in range(10)), (9, 1), *((e, 0) for e in range(10, 20))]
 
 
 @pytest.mark.parametrize("absurd", [np.nan, np.inf, -1e7])
 @pytest.mark.parametrize("name", ["theta", "w"])
-def test_weights_that_are_not_numbers_or_absurd_are_a_divergence(sound, name, absurd):
-    def spoil(theta, memory):
-        spoiled = {"theta": theta.copy(), "w": memory.w.copy()}
-        spoiled[name][4] = absurd
-        return spoiled["theta"], Auxiliary(spoiled["w"])
+def test_weights_that_are_not_numbers_or_absurd_are_a_divergence(robot, name, absurd):
+    added, steps = iter([0.0, 0.0, absurd]), []
 
-    steps = []
+    def step(theta, memory, *_):
+        vectors = {"theta": theta.copy(), "w": memory.w.copy()}
+        vectors[name][4] += next(added)
+        return vectors["theta"], Auxiliary(vectors["w"])
+
+    learner = replace(es(robot), rule=UpdateRule(step, first_w))
     with pytest.raises(Diverged, match=rf"(?s)^{name} .*left the numbers"):
-        steps.extend(train(leap(spoil)(sound), sound, first_weights(), quiet(2, 5)))
-    assert places(steps) == [(0, 0), (0, 1), (0, 2)]
-    assert not np.abs(getattr(steps[-1].weights, name)[4]) <= 1e6  # the step itself is kept
+        steps.extend(train(learner, robot, Weights(THETA), noise(2, 5)))
+    assert places(steps) == [(0, 0), (0, 1), (0, 2)]  # the step itself is kept
 
 
-@pytest.fixture(scope="module")
-def rollout(sound):
-    return evaluate(sound, THETA, paper.STEPS)
+@pytest.mark.parametrize(
+    ("solver", "theta", "cost"),  # of independent code, over t = 0, ..., 129 and not discounted
+    [("riccati", THETA, 4695), ("ipopt", THETA, 4695), ("riccati", [*THETA[:-1], 0.35], 4119)],
+)
+def test_the_cost_without_noise_is_the_reference(solver, theta, cost):
+    found = evaluate(paper.nmpc(solver=solver), np.array(theta), paper.STEPS)
+    assert found.cost == pytest.approx(cost, abs=1)
 
 
-def test_the_noise_free_cost_of_theta_init_is_the_reference(rollout):
-    """DESIGN's number, from independent code: 4695 over t = 0, ..., 129, not discounted."""
-    assert rollout.cost == pytest.approx(4695, abs=1)
+def test_a_rollout_follows_the_plant_to_the_target_and_adds_up_its_costs(robot):
+    plant, task, ran = robot.plant, robot.task, evaluate(robot, THETA, paper.STEPS)
+    assert (ran.states.shape, ran.actions.shape) == ((130, 3), (130, 2))
+    later = [plant.step(s, a) for s, a in zip(ran.states, ran.actions, strict=True)]
+    np.testing.assert_array_equal(ran.states, [task.start, *later[:-1]])
+    by_hand = [task.stage_cost(s, a) for s, a in zip(ran.states, ran.actions, strict=True)]
+    assert ran.cost == pytest.approx(sum(by_hand), rel=1e-14)
+    assert task.distance(ran.states[-1]) < 0.1
+    assert (task.overlap(ran.states) <= 1e-6).all()
+    assert (np.abs(ran.actions) <= plant.upper).all()
+    assert ((task.lower <= ran.states) & (ran.states <= task.upper)).all()
 
 
-def test_with_theta_c_at_the_penaltys_margin_the_cost_is_the_other_reference(sound):
-    assert evaluate(sound, np.append(THETA[:-1], 0.35), paper.STEPS).cost == pytest.approx(
-        4119, abs=1
-    )
-
-
-def test_ipopt_reaches_the_same_cost(rollout):
-    controller = paper.nmpc(solver="ipopt")
-    assert evaluate(controller, THETA, paper.STEPS).cost == pytest.approx(rollout.cost, rel=1e-4)
-
-
-def test_a_rollout_follows_the_plant_and_adds_up_its_costs(sound, rollout):
-    plant, task = sound.plant, sound.task
-    assert rollout.states.shape == (130, 3)
-    assert rollout.actions.shape == (130, 2)
-    np.testing.assert_array_equal(rollout.states[0], task.start)
-    for now, action, later in zip(
-        rollout.states[:-1], rollout.actions[:-1], rollout.states[1:], strict=True
-    ):
-        np.testing.assert_array_equal(plant.step(now, action), later)
-    by_hand = [task.stage_cost(s, a) for s, a in zip(rollout.states, rollout.actions, strict=True)]
-    assert rollout.cost == pytest.approx(sum(by_hand), rel=1e-14)
-
-
-def test_the_rollout_of_theta_init_reaches_the_target_and_hits_nothing(sound, rollout):
-    task = sound.task
-    assert task.distance(rollout.states[-1]) < 0.1
-    assert (task.overlap(rollout.states) <= 1e-6).all()
-    assert (np.abs(rollout.actions) <= sound.plant.upper).all()
-    assert (task.lower <= rollout.states).all()
-    assert (rollout.states <= task.upper).all()
-
-
-def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_had():
-    controller = Faulty(lambda call: call >= 3)
-    failed = evaluate(controller, THETA, 10)
+@pytest.mark.parametrize("first", [0, 3])  # call that fails
+def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_had(first):
+    failed = evaluate(Faulty(lambda call: call >= first), THETA, 10)
+    assert (failed.states.shape, failed.actions.shape) == ((first, 3), (first, 2))
     assert failed.cost == np.inf
-    assert failed.states.shape == (3, 3)
-    assert failed.actions.shape == (3, 2)
-    assert "failed" in failed.failure
+    assert f"call {first} failed" in failed.failure
 
 
-@pytest.mark.parametrize("plant", [None, lambda x, u, rng: (x[:2], float(u @ u), False)])
-def test_a_rollout_needs_no_more_than_a_solve(sound, plant):
-    class Lower:
-        """The lower of two solves; what it holds says where, or plant and start do."""
+class Lower:
+    """The lower of two solves of an NMPC, which it has as an attribute or not."""
 
-        def __init__(self, nmpc):
-            self.solve = lambda state, theta, plan: min(
-                nmpc.solve([*state, 0.0][:3], theta, plan), nmpc.solve([*state, 0.0][:3], theta),
-                key=lambda one: one.value,
-            )  # fmt: skip
-            self.inner = nmpc if plant is None else None
-
-    start = None if plant is None else [0.5, 0.2]
-    ran = evaluate(Lower(sound), THETA, 4, plant=plant, start=start)
-    assert ran.states.shape == (4, 3 if plant is None else 2)
-    if plant is None:
-        assert ran.cost == pytest.approx(evaluate(sound, THETA, 4).cost, rel=1e-6)
-        steps = train(frozen(sound), Lower(sound), first_weights(), quiet(1, 4))
-        np.testing.assert_array_equal([step.state for step in steps], ran.states)
-    else:
-        with pytest.raises(ValueError, match=r"give plant=.* and start="):
-            evaluate(Lower(sound), THETA, 4)
+    def __init__(self, nmpc, inner):
+        self.inner = inner
+        self.solve = lambda state, theta, plan: min(
+            nmpc.solve([*state, 0.0][:3], theta, plan), nmpc.solve([*state, 0.0][:3], theta),
+            key=lambda one: one.value,
+        )  # fmt: skip
 
 
-def test_a_rollout_that_fails_at_once_has_no_steps():
-    controller = Faulty(lambda call: True)
-    failed = evaluate(controller, THETA, 10)
-    assert failed.states.shape == (0, 3)
-    assert failed.actions.shape == (0, 2)
-    assert failed.cost == np.inf
+def test_a_rollout_needs_no_more_than_a_solve_and_an_environment(robot):
+    ran = evaluate(Lower(robot, robot), THETA, 4)
+    assert ran.cost == pytest.approx(evaluate(robot, THETA, 4).cost, rel=1e-6)
+    still = Exploration(np.zeros((1, 4, 2)), np.ones((1, 4)))
+    steps = train(frozen(robot), Lower(robot, robot), Weights(THETA), still)
+    np.testing.assert_array_equal([step.state for step in steps], ran.states)
+    plant = {"plant": lambda x, u, rng: (x[:2], float(u @ u), False), "start": [0.5, 0.2]}
+    assert evaluate(Lower(robot, None), THETA, 4, **plant).states.shape == (4, 2)
+    with pytest.raises(ValueError, match=r"give plant=.* and start="):
+        evaluate(Lower(robot, None), THETA, 4)
