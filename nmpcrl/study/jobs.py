@@ -23,7 +23,6 @@ from tqdm import tqdm
 
 from nmpcrl.study.refusal import ParameterError, Refusal
 
-ATTEMPTS = 3  # how often a job is begun whose process is killed
 AHEAD = 128  # jobs given to an executor of the caller's at a time
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 MEMORY = 0.45e9  # [bytes] of a worker at the end of a full run of RDES
@@ -67,8 +66,9 @@ def parallel(
 ) -> Iterator[tuple[Item, Result]]:
     """Call a function with every item; yield each item and its result as soon as it has one.
 
-    A failed job stops no other one. When a process is killed, each job in progress is begun again
-    alone, so that none fails for what another one did. Leaving the loop early ends all processes.
+    A failed job stops no other one, and `Failed` is raised at the end. When a process is killed,
+    each job in progress is begun again alone, so that none fails for what another one did. Leaving
+    the loop early ends all processes.
 
     Args:
         function: called in a worker; it may be defined in a notebook.
@@ -77,10 +77,6 @@ def parallel(
         label: of a progress bar; without a label there is none.
         executor: makes the calls in place of new processes, `AHEAD` at a time.
         ready: called here shortly before a worker is free for an item, which False skips.
-
-    Raises:
-        ParameterError: `workers` is no number of processes.
-        Failed: jobs failed; raised at the end.
     """
     if workers is not None and (type(workers) is not int or workers < 1):
         raise ParameterError(f"workers = {workers!r} must be a whole number, 1 or more")
@@ -112,11 +108,8 @@ def _outcomes(
     """Every item with its result or its `Failure`."""
     while lost := (yield from _until_broken(pool(count), ahead, function, items)):
         for item in lost:
-            for _ in range(ATTEMPTS - 1):
-                if not (yield from _until_broken(pool(1), 1, function, iter([item]))):
-                    break
-            else:
-                yield item, Failure(item, f"the loss of its process, {ATTEMPTS} times")
+            if (yield from _until_broken(pool(1), 1, function, iter([item]))):
+                yield item, Failure(item, "the loss of its process, twice")
 
 
 def _until_broken(
@@ -139,26 +132,27 @@ def _until_broken(
             for future in wait(pending, WAIT, FIRST_COMPLETED).done:
                 item = pending.pop(future)
                 try:
-                    failed, made = pickle.loads(future.result())
+                    made = pickle.loads(future.result())
                 except BrokenExecutor:
                     lost.append(item)
                     continue
                 except Exception as error:  # of the executor
-                    failed, made = True, (_text(error), "")
+                    made = _failure(error)
                 del future  # as long as it is referenced, Dask repeats a job whose worker is lost
-                yield item, Failure(item, *made) if failed else made
+                yield item, made._replace(item=item) if isinstance(made, Failure) else made
 
 
 def _call(function: Callable[[Item], Any], item: Item) -> bytes:
     """Make a call in a worker; executors lose errors and results that cannot be pickled."""
     try:
-        return pickle.dumps((False, function(item)))
+        return pickle.dumps(function(item))
     except (Exception, SystemExit) as error:
-        return pickle.dumps((True, (_text(error), traceback.format_exc())))
+        return pickle.dumps(_failure(error))
 
 
-def _text(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"
+def _failure(error: BaseException) -> Failure:
+    """The failure of a job, whose item no worker may be able to pickle."""
+    return Failure(None, f"{type(error).__name__}: {error}", traceback.format_exc())
 
 
 @contextmanager
