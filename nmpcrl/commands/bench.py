@@ -55,7 +55,6 @@ def bench(
 
 
 def _print_times(length: str, *, again: bool) -> None:
-    """Print a row for each target, and where the benchmark is stored."""
     from nmpcrl.bench import suite, targets
 
     measured = suite.measure(length) if again else suite.read_or_measure(length)
@@ -68,7 +67,6 @@ def _print_times(length: str, *, again: bool) -> None:
 
 
 def _print_live(*, again: bool) -> None:
-    """Print a row for each target of the live figures, and where their times are stored."""
     from nmpcrl.bench import live, targets
     from nmpcrl.bench.live_targets import live_targets
 

@@ -38,9 +38,8 @@ def investigate(
     """Make and judge the rows of an investigation.
 
     NAME is one of the book's (agents, interventions, other_problems, population,
-    population_layouts, remedies, worlds), or a Python file that defines one
-    Investigation. Each row is stored as soon as it is made, so a run can be
-    interrupted and started again.
+    population_layouts, remedies, worlds), or a Python file that defines one.
+    Each row is stored as soon as it is made, so a run can be interrupted.
 
     \b
     Example:

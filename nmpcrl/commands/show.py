@@ -43,9 +43,9 @@ def show(run: str, out: Path | None) -> None:
     if not is_accepted(records.facts.get("sources")):
         click.echo(f"{path} is of other code, whose numbers may differ", err=True)
     warn_of_changes()
-    frozen = None
-    if records.experiment["learner"] != "frozen":
-        frozen = RUNS.read(frozen_arm(Experiment(**records.experiment)))
-    figure = run_page(records, frozen)
+    arm = frozen_arm(Experiment(**records.experiment))
+    figure = run_page(
+        records, None if records.experiment["learner"] == "frozen" else RUNS.read(arm)
+    )
     write_file(out, lambda file: write(figure, file, kind))
     click.echo(f"{verdict(records)}\n{out}")

@@ -16,10 +16,7 @@ from nmpcrl.study.refusal import Refusal
 def executor(address: str, patience: float = 30.0) -> Iterator[Executor]:
     """The workers of the scheduler at an address such as "tcp://host:8786".
 
-    Scheduler and first worker are waited for `patience` seconds.
-
-    Raises:
-        Refusal: Dask, the scheduler or a worker is missing.
+    A Refusal names what is missing: Dask, or a scheduler or worker after `patience` seconds.
     """
     try:
         from distributed import Client

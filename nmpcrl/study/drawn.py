@@ -14,25 +14,18 @@ Scenarios with moving obstacles, M01 to M40, are the first that were drawn with 
 """
 
 import json
-from functools import cache
 from pathlib import Path
-from typing import Any
 
-from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.experiment import LAYOUT
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.moving import KINDS, Motion
 
 FOLDER = Path(__file__).parent
 Scenario = tuple[Motion, ...]
 
-
-def _read(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((FOLDER / name).read_text("utf-8"))
-    return found
-
-
+POPULATION = json.loads((FOLDER / "population.json").read_text("utf-8"))
 LAYOUTS: dict[str, Centres] = {
-    name: tuple((x, y) for x, y in centres) for name, centres in _read("population.json").items()
+    name: tuple((x, y) for x, y in centres) for name, centres in POPULATION.items()
 }
 TUNE = {name: centres for name, centres in LAYOUTS.items() if name[0] == "T"}
 JUDGE = {name: centres for name, centres in LAYOUTS.items() if name[0] == "J"}
@@ -42,14 +35,12 @@ OPEN = (1, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)
 COMPARED = tuple(f"J{i:03}" for i in sorted(CLOSING + OPEN))  # with other horizons and step sizes
 
 
-def name_of(layout: str | Centres) -> str:
+NAMES = {LAYOUT.read(centres): name for name, centres in LAYOUTS.items()}
+
+
+def name_of(layout: str) -> str:
     """The name of a layout, given as a field of an `Experiment`; A to F are names."""
-    return _names().get(layout) or str(layout)
-
-
-@cache
-def _names() -> dict[Any, str]:
-    return {Experiment(layout=centres).layout: name for name, centres in LAYOUTS.items()}
+    return NAMES.get(layout, layout)
 
 
 def _motion(kind: str, fields: dict[str, float | list[float]]) -> Motion:
@@ -59,5 +50,5 @@ def _motion(kind: str, fields: dict[str, float | list[float]]) -> Motion:
 
 SCENARIOS: dict[str, Scenario] = {
     name: tuple(_motion(*one) for one in scenario)
-    for name, scenario in _read("scenarios.json").items()
+    for name, scenario in json.loads((FOLDER / "scenarios.json").read_text("utf-8")).items()
 }

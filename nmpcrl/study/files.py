@@ -23,11 +23,7 @@ def folder() -> Path:
 
 
 def check_folder() -> None:
-    """Make the folder of the runs, and write a file to it.
-
-    Raises:
-        StoreError: it cannot be made or written.
-    """
+    """Make the folder of the runs and write a file to it; StoreError where that is impossible."""
     place = folder()
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -54,8 +50,7 @@ def say(sentence: str) -> None:
 def write_file(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let `write` fill a temporary file, then rename it to `path`: no reader sees a part of it.
 
-    Raises:
-        OSError: the file cannot be written; an earlier file of this name stays.
+    An earlier file stays where that fails.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}-{secrets.token_hex(4)}.tmp")

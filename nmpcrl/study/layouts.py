@@ -50,7 +50,7 @@ class Screening:
 def screen(centres: Centres) -> Screening:
     """Apply the criteria to a layout; nothing is trained for it."""
     task = paper.task(centres)
-    blocked = bool(_distances(task.start[:2], task.target[:2], centres).min() < _keep_out(task, 0))
+    blocked = _nearest(task.start[:2], task.target[:2], centres) < _keep_out(task, 0)
     clear = task.collision_penalty(task.start) == 0 == task.collision_penalty(task.target)
     if not (blocked and clear):
         return Screening(blocked, clear, arrives=False, closing=False)
@@ -89,13 +89,12 @@ def _keep_out(task: Task, theta_c: float) -> float:
     return float(task.discs[2].max() / 2 * np.sqrt(1 + theta_c))
 
 
-def _distances(start: Vector, end: Vector, points: Sequence[Sequence[float]]) -> Vector:
-    """Distance of each point, shape (k, 2), from the segment between two points."""
+def _nearest(start: Vector, end: Vector, points: Sequence[Sequence[float]]) -> float:
+    """The least distance of points, shape (k, 2), from the segment between two points."""
     along = end - start
     away = np.asarray(points) - start
     share = np.clip(away @ along / (along @ along), 0, 1)
-    result: Vector = np.linalg.norm(away - share[:, None] * along, axis=1)
-    return result
+    return float(np.linalg.norm(away - share[:, None] * along, axis=1).min())
 
 
 def _crosses(path: Matrix, one: Vector, other: Vector) -> bool:

@@ -38,11 +38,7 @@ def seconds_of(experiment: Experiment) -> float:
 def afford(experiments: Iterable[Experiment], *, sure: bool = False) -> None:
     """Refuse runs that take more than `HOURS` together, and a run of more than `STEPS` steps.
 
-    An experiment that is given twice counts once. `sure`, or `SURE` in the environment, allows any
-    number of hours.
-
-    Raises:
-        ParameterError: in one sentence.
+    `sure`, or `SURE` in the environment, allows any number of hours.
     """
     runs = tuple(dict.fromkeys(experiments))
     for e in runs:

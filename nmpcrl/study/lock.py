@@ -1,9 +1,8 @@
 """The hashes of the code on which numbers depend, and the lock that they are compared with.
 
-`sources.lock.json` has a hash of every file of `FILES`. Where a file differs from the lock, a test
-fails and every command that reads a run warns, until `nmpcrl verify --relock` has shown with fresh
-runs that no bit has changed, or an epoch of `provenance` is raised. A stored run names the hash of
-the sources that made it; `is_accepted` says which are read.
+Where a file of `FILES` differs from `sources.lock.json`, a test fails and commands that read a run
+warn, until `nmpcrl verify --relock` has shown with fresh runs that no bit has changed, or an epoch
+of `provenance` is raised. A stored run names the hash of the sources that made it.
 """
 
 import ast
@@ -67,9 +66,9 @@ def locks() -> tuple[str, ...]:
 
 
 def is_accepted(made: str | None) -> bool:
-    """Whether sources with this `sources_hash` make the present numbers; None for unstored runs.
+    """Whether sources with this hash are the present ones, or those of a lock of these epochs.
 
-    They are the present sources, those of the lock, or those of an earlier lock of these epochs.
+    Runs that were never stored name none.
     """
     return made in (None, sources_hash()) or made in locks()
 
@@ -107,8 +106,8 @@ def warn_of_changes() -> None:
 def code(text: str) -> str:
     """A module's syntax tree as text, without comments, docstrings and types of functions.
 
-    It has the imports that are used or that rename, with the last name of a module of this package,
-    so that a file can be moved. The text is the same on every version of Python.
+    Imports count if they are used or rename, by the last name of a module of this package, so that
+    a file can be moved. The text is the same on every version of Python.
     """
     tree = ast.parse(text)
     for node in ast.walk(tree):

@@ -3,11 +3,10 @@
     min   sum_i gamma^i (||theta_x (x_i - s_ref)||^2 + ||theta_u u_i||^2 + omega' sigma_i) + ...
     s.t.  Xi(x_i, o_i) + theta_c <= sigma_i
 
-This is Eq. (2) with centres o_i that are data of each stage, and a soft box. In the paper's layouts
-it has the value of the paper's controller to seven digits.
-
-The value becomes V_theta(s, t). The TD error is the one of the Markov chain with the time in its
-state if a second solve with the data of t + 1 bootstraps it, and if the predictor is exact.
+This is Eq. (2) with centres o_i that are data of each stage, and a soft box; in the paper's layouts
+it has the value of the paper's controller to seven digits. The value becomes V_theta(s, t): the TD
+error is the one of the Markov chain with the time in its state if a second solve with the data of
+t + 1 bootstraps it, and if the predictor is exact.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -63,10 +62,9 @@ class Sinusoidal:
 
 @dataclass(frozen=True)
 class Polynomial:
-    """Motion to and fro on the graph of a polynomial p over an axis, as in DynaBARN.
+    """Motion to and fro on the graph of a polynomial p over an axis: Nair et al. (2022), DynaBARN.
 
     centre + along s + across p(s), |s| <= 1, where s runs at constant speed and turns at the ends.
-    Source: Nair et al. (2022), from the description.
     """
 
     centre: Point  # [m]
@@ -142,10 +140,7 @@ def problem(
     terminal: Callable[..., Any] = diagonal,
     further: Mapping[str, Any] = MappingProxyType({}),
 ) -> Problem:
-    """Eq. (2) among obstacles whose centres are data.
-
-    Parameters of the model or the terminal cost, `further`, follow the paper's in theta.
-    """
+    """Eq. (2) among obstacles whose centres are data; `further` parameters end theta."""
     first = np.array(paper.THETA_INIT)
     theta: dict[str, Any] = {"x": first[:3], "u": first[3:5], "f": first[5:8], "c": first[8]}
 

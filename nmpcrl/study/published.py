@@ -1,11 +1,10 @@
 """The published data in `book/published`: tables, arrays, and one manifest that describes them.
 
-A table is `NAME.csv`; what does not fit in one is `NAME.npz`. `manifest.json` has for each name the
-hashes of its files, the commit that registered questions and settings before the first row, and
-the batches in which rows were made: date, machine, versions, epochs, and what was added.
+A name has a table, `NAME.csv`, and may have arrays, `NAME.npz`. `manifest.json` has for each name
+the hashes of its files, the commit that registered questions and settings before the first row, and
+the batches in which rows were made: date, machine, versions, epochs, and counts of rows.
 
-Files are read as they were written, floats to the last digit. A cell with a list is JSON; a text
-column has no missing cells.
+Floats are read to the last digit. A cell with a list is JSON; a text column has no missing cells.
 """
 
 import io
@@ -65,7 +64,7 @@ def arrays(name: str, where: Path | None = None) -> Arrays:
 
 
 def about(name: str, where: Path | None = None) -> dict[str, Any]:
-    """What the manifest says of a name; nothing where nothing is published."""
+    """The entry of a name in the manifest; empty if nothing is published."""
     return dict(_manifest(where or folder()).get(name, {}))
 
 
@@ -75,31 +74,20 @@ def counts(batch: Batch) -> dict[str, int]:
 
 
 def batch_of(entry: Mapping[str, Any], part: str = "") -> Batch:
-    """The batch of a part: the last that counts it, else the first; empty if nothing is published.
-
-    Args:
-        entry: of the manifest, as `about` gives it.
-        part: of the table; "" for a table without parts.
-    """
+    """The last batch in an entry of the manifest that counts a part, else the first one, if any."""
     batches = entry.get("batches", [])
     found: list[Batch] = [one for one in batches if part in counts(one)] or batches[:1]
     return found[-1] if found else {}
 
 
 def epochs(entry: Mapping[str, Any], part: str = "") -> dict[str, int]:
-    """The epochs in which the rows of a part were made; empty where nothing is published.
-
-    Batches without epochs are of the first.
-    """
+    """The epochs of a part's rows, 1 where its batch has none; empty if nothing is published."""
     batch = batch_of(entry, part)
     return {**dict.fromkeys(EPOCHS, 1), **batch.get("epochs", {})} if batch else {}
 
 
 def is_current(
-    name: str,
-    part: str = "",
-    where: Path | None = None,
-    present: Mapping[str, int] = EPOCHS,
+    name: str, part: str = "", where: Path | None = None, present: Mapping[str, int] = EPOCHS
 ) -> bool:
     """Whether the published rows of a part are of the present epochs."""
     return epochs(about(name, where), part) == present
@@ -110,10 +98,10 @@ def without(batches: Iterable[Batch], parts: Collection[str]) -> list[dict[str, 
     kept = []
     for batch in batches:
         left = {part: n for part, n in counts(batch).items() if part not in parts}
-        if left or not counts(batch):
-            kept.append(
-                {**batch, **({"runs" if "runs" in batch else "rows": left} if left else {})}
-            )
+        if left:
+            kept.append({**batch, "runs" if "runs" in batch else "rows": left})
+        elif not counts(batch):
+            kept.append({**batch})
     return kept
 
 
@@ -127,16 +115,16 @@ def write(
     earlier: Iterable[Batch] | None = None,
     where: Path | None = None,
 ) -> Path:
-    """Write a table, and its arrays if there are any, note them in the manifest; the table's path.
+    """Write a whole table and its arrays, and describe them in the manifest; the table's path.
 
     Args:
         name: of the files, without a suffix.
-        table: all rows, those of earlier batches included.
+        table: all rows, with those of earlier batches.
         arrays: all arrays.
-        batch: what was added now, and where, when and with what: `provenance.made_here()`.
-        registered: the commit that fixed what would be made, before anything was.
-        earlier: batches whose rows stay; by default all. Where counted rows are the whole table,
-            a batch without counts has no row left and is dropped.
+        batch: `provenance.made_here()`, and counts of the new rows.
+        registered: the commit of questions and settings, if no row is published yet.
+        earlier: batches whose rows stay; by default all. A batch without counts is dropped where
+            the others count every row.
         where: the folder, by default the project's.
     """
     place = where or folder()

@@ -86,7 +86,7 @@ class Records:
     facts: dict[str, Any]
 
     def save(self, path: Path) -> None:
-        """Write a file as a whole; errors as in `write_file`."""
+        """Write a file as `write_file` does."""
         tables = {"steps": self.steps, "evaluations": self.evaluations}
         save_run(path, self.experiment, self.facts, tables)
 
@@ -103,11 +103,7 @@ def save_run(
     facts: Mapping[str, Any],
     tables: Mapping[str, Mapping[str, Column]],
 ) -> None:
-    """Write an .npz with members TABLE/COLUMN, and `about`: JSON of the experiment and the facts.
-
-    Raises:
-        OSError: the file cannot be written; an earlier one stays.
-    """
+    """Write an .npz: members TABLE/COLUMN, and `about`, JSON of the experiment and the facts."""
     about = np.array(json.dumps({"experiment": experiment, "facts": facts}))
     members: dict[str, Any] = {
         f"{table}/{name}": one for table, columns in tables.items() for name, one in columns.items()
@@ -120,10 +116,8 @@ def load_run(
 ) -> tuple[About, dict[str, dict[str, Column]]]:
     """The experiment and the facts of a file, and its tables with these columns.
 
-    Raises:
-        FileNotFoundError: there is no file.
-        DamagedRecords: a checksum of the zip format is wrong, the file names no run, or its columns
-            have other names or unequal lengths.
+    DamagedRecords: a checksum of the zip format is wrong, the file names no run, or its columns
+    have other names or unequal lengths.
     """
     tables: dict[str, dict[str, Column]] = {table: {} for table in columns}
     with path.open("rb") as raw:

@@ -35,13 +35,10 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
     def __init__(
         self, layout: Any = None, *, motions: Sequence[Motion] = (), steps: int = paper.STEPS
     ) -> None:
-        """Choose the layout.
+        """Choose the layout and the number of steps after which an episode is truncated.
 
-        Args:
-            layout: A to F, T01 to T60, or the centres of obstacles; one of the 60 of `TUNE` is
-                drawn at each reset if absent.
-            motions: of moving obstacles, whose first centres are the layout.
-            steps: of an episode, which is truncated then.
+        A layout is A to F, T01 to T60, or centres; by default each reset draws one of `TUNE`. With
+        `motions`, the layout has their first centres.
         """
         self.plant, self._steps = robot(), STEPS.check("steps", steps)
         self._fixed, self._motions = None if layout is None else centres_of(layout), motions

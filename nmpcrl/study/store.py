@@ -6,7 +6,7 @@ lets one process at a time train a run; the system frees it when the process end
 
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -28,8 +28,6 @@ from nmpcrl.study.trial import Trial
 
 Value = TypeVar("Value")  # of a store: Records or a RunSummary
 Named = Experiment | Trial  # names a run
-TRIALS = "trials"  # subfolder of their runs
-LOCKS = ".locks"
 
 
 class Runs(dict[Experiment, Value]):
@@ -37,45 +35,35 @@ class Runs(dict[Experiment, Value]):
 
     def select(self, **fields: Any) -> "Runs[Value]":
         """The runs whose experiment has these field values: `select(learner="ES", seed=0)`."""
-        return Runs(
-            {
-                experiment: records
-                for experiment, records in self.items()
-                if all(getattr(experiment, name) == value for name, value in fields.items())
-            }
-        )
+        asked = fields.items()
+        chosen = (e for e in self if all(getattr(e, name) == value for name, value in asked))
+        return Runs({e: self[e] for e in chosen})
 
     def values_of(self, field: str) -> tuple[Any, ...]:
         """The values that a field takes, in order of appearance."""
-        return tuple(dict.fromkeys(getattr(experiment, field) for experiment in self))
+        return tuple(dict.fromkeys(getattr(e, field) for e in self))
 
 
+@dataclass(eq=False)
 class Store(Generic[Value]):
     """Values of one class in files, one for each experiment or trial."""
 
-    def __init__(
-        self, kind: Any, make: Callable[..., Value], key: Callable[[Any], str], subfolder: str = ""
-    ) -> None:
-        """A store of values of the class `kind`, which `make` makes in workers.
-
-        A file is in `subfolder` of the runs, and its name has the beginning of `key`.
-        """
-        self.kind, self.make, self.key, self.subfolder = kind, make, key, subfolder
+    kind: Any  # the class
+    make: Callable[..., Value]  # called in workers
+    key: Callable[[Any], str]  # its beginning is in the name of a file
+    subfolder: str = ""  # of the folder of the runs
 
     def path_of(self, named: Named) -> Path:
         """The file of a value."""
         if isinstance(named, Trial):
-            place, name = TRIALS, named.name
+            place, name = "trials", named.name
         else:
             e, place = named, self.subfolder
             name = f"{e.learner}-{short_name(e.layout)}-{e.decay}-seed{e.seed}-{e.episodes}ep"
         return folder() / place / f"{name}-{self.key(named)[:10]}.npz"
 
     def read(self, named: Named, *, report: bool = False) -> Value | None:
-        """The stored value; None if there is none, or if the file is damaged or of another run.
-
-        `report` prints why a file is of no use.
-        """
+        """The stored value; None if no file has it. `report` says why a file is of no use."""
         lock.warn_of_changes()
         path = self.path_of(named)
         try:
@@ -100,14 +88,8 @@ class Store(Generic[Value]):
     def fetch(self, named: Named, **options: Any) -> Value:
         """The run of an experiment or a trial: read if it is stored, otherwise made and stored.
 
-        A run that another solver had to solve is returned, and not stored.
-
-        Args:
-            named: names the run.
-            options: as `run` takes them.
-
-        Raises:
-            StoreError: the run is not stored, and cannot be.
+        `options` are those of `run`. A run that another solver had to solve is returned, and not
+        stored. StoreError says why no run can be stored.
         """
         value = self.read(named)
         if value is None:
@@ -135,15 +117,12 @@ class Store(Generic[Value]):
             executor: makes the runs, such as a Dask client's; by default new processes.
             workers: how many processes; by default as many as there are cores.
             progress: whether to show a bar.
-            strict: whether an error is raised where a run failed, or only printed.
-
-        Raises:
-            StoreError: runs are missing and cannot be stored.
-            Failed: runs failed, and `strict` holds; all others are stored.
+            strict: whether `Failed` is raised once all other runs are stored, or only printed.
         """
         wanted: tuple[Any, ...] = tuple(dict.fromkeys(names))
         found = {one: value for one in wanted if (value := self.read(one)) is not None}
-        missing = sorted((one for one in wanted if one not in found), key=_seconds, reverse=True)
+        missing = [one for one in wanted if one not in found]
+        missing.sort(key=lambda one: -seconds_of(one) if isinstance(one, Experiment) else 0.0)
         if missing:
             check_folder()
             compile_ahead(missing)
@@ -174,8 +153,7 @@ class Store(Generic[Value]):
     def keep(self, named: Named, value: Any) -> None:
         """Store a value, unless another solver than the experiment's made it.
 
-        Raises:
-            StoreError: a worker with other code made it, or the file cannot be written.
+        StoreError: a worker with other code made it, or the file cannot be written.
         """
         if why := refused(named, value.facts):
             sentence = f"{named} is not stored: the worker made {why}"
@@ -191,7 +169,7 @@ class Store(Generic[Value]):
 
     def lock(self, named: Named) -> FileLock:
         """The lock of a value; not acquired."""
-        locks = folder() / LOCKS
+        locks = folder() / ".locks"
         locks.mkdir(parents=True, exist_ok=True)
         return FileLock(locks / self.path_of(named).stem, thread_local=False)
 
@@ -218,10 +196,6 @@ class Store(Generic[Value]):
             found[named] = value
             lock.release()
         return value is None
-
-
-def _seconds(named: Named) -> float:
-    return seconds_of(named) if isinstance(named, Experiment) else 0.0
 
 
 def train(named: Named, **options: Any) -> Records:

@@ -26,9 +26,7 @@ class Trial:
 
     The key of the run holds all fields: after an edit of a function the run is trained again.
     Functions may be defined in a notebook. Generators and networks are made by `make`.
-
-    Raises:
-        ParameterError: a field has a value that is not allowed, or that no key can be made of.
+    ParameterError refuses a value that no key can be made of.
     """
 
     learner: str  # name of the learner in tables and figures
