@@ -48,8 +48,8 @@ def limited() -> Problem:
     )
 
 
-def tank(unit: float, **changes: Any) -> Problem:
-    """A pressure and a temperature in any unit; the costs and rows have none."""
+def tank(unit: float, row: float = 1.0, cost: float = 1.0, **changes: Any) -> Problem:
+    """A pressure and a temperature in any unit, as its soft row and its costs."""
 
     def model(x: Any, u: Any, th: Any) -> Any:
         pressure = x[0] + 0.1 * (-th["k"] * x[0] + u + 0.1 * unit * ca.sin(x[1] / unit))
@@ -62,9 +62,9 @@ def tank(unit: float, **changes: Any) -> Problem:
         "states": 2, "inputs": 1, "horizon": 8, "gamma": 0.95,
         "theta": {"k": 0.3, "target": np.array([1.3, 1.2])},
         "model": model,
-        "stage": lambda x, u, th: away(x, th) + 0.01 * ca.sumsqr(u / unit),
-        "terminal": lambda x, th: 5 * away(x, th),
-        "soft": [Soft(lambda x, u, th: x[0] / unit - 1.2, weight=2.0)],
+        "stage": lambda x, u, th: cost * (away(x, th) + 0.01 * ca.sumsqr(u / unit)),
+        "terminal": lambda x, th: cost * 5 * away(x, th),
+        "soft": [Soft(lambda x, u, th: row * (x[0] / unit - 1.2), weight=2.0 * cost / row)],
         "lower": -unit, "upper": 2 * unit,
     }  # fmt: skip
     return Problem(**fields | changes)

@@ -5,6 +5,7 @@ problem is written with CasADi: its KKT conditions, and an Ipopt that solves it 
 """
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -27,10 +28,12 @@ from nmpcrl.control import (
 )
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import lagrangian
+from nmpcrl.control.solvers.stages import STEEP
 from nmpcrl.control.solvers.starts import random_inputs
+from nmpcrl.study import paper
 
 ROBOT = differential_drive()
-KKT = 3e-8  # left of the conditions, each in its own unit: see `residual`; the solver allows 1e-8
+KKT = 2e-8  # left of the conditions in their units, see `residual`: mu and its error, 1e-8 each
 HARDEST = json.loads(Path(__file__).with_name("hardest.json").read_text())
 
 
@@ -48,14 +51,25 @@ class Problem(NamedTuple):
         return nmpc.solve(self.state, self.theta, warm_start, self.action)
 
 
+def world(plant: Plant, target, lower, upper, discs, *how) -> Nmpc:
+    """A controller; `how` are horizon, gamma and omega."""
+    obstacles = tuple(Obstacle(*disc) for disc in discs)
+    task = Task(target, target, lower, upper, obstacles, weights=np.ones(plant.n))
+    return Nmpc(plant, task, *how)
+
+
+def like(nmpc: Nmpc, task: Task | None = None, solver: Riccati | str = "riccati") -> Nmpc:
+    """A controller with another task or solver."""
+    how = nmpc.horizon, nmpc.gamma, nmpc.slack_weight
+    return Nmpc(nmpc.plant, task or nmpc.task, *how, solver=solver)
+
+
 def controller(rng: np.random.Generator, plant: Plant = ROBOT, longest: int = 40) -> Nmpc:
     """A layout, a box, a target, N, gamma and omega; obstacles may lie on each other, or on it."""
     horizon = int(rng.choice([1, 2, 3, 5, 10, min(20, longest), longest]))
     count = int(rng.choice([0, 1, 2, 4, 8, 16]))
-    discs = [
-        (*rng.uniform(-3, 9, 2), float(rng.choice([2.0, 2.0, 0.5, 4.0, 0.01])))
-        for _ in range(count)
-    ]
+    diameters = [2.0, 2.0, 0.5, 4.0, 0.01]
+    discs = [(*rng.uniform(-3, 9, 2), float(rng.choice(diameters))) for _ in range(count)]
     target = np.append(rng.uniform(-3, 9, 2), np.zeros(plant.n - 2))
     if rng.random() < 0.1:
         target[:2] = -3, 9
@@ -68,16 +82,8 @@ def controller(rng: np.random.Generator, plant: Plant = ROBOT, longest: int = 40
         lower[0] = -np.inf
     if walls == 2:
         lower[-1], upper[-1] = -4, 4
-    task = Task(
-        start=target,
-        target=target,
-        lower=lower,
-        upper=upper,
-        obstacles=tuple(Obstacle(*disc) for disc in discs),
-        weights=np.ones(plant.n),
-    )
     gamma, omega = rng.choice([0.97, 0.97, 1.0, 0.9, 0.5]), rng.choice([100.0, 100.0, 1.0, 1e3])
-    return Nmpc(plant, task, horizon=horizon, gamma=float(gamma), slack_weight=float(omega))
+    return world(plant, target, lower, upper, discs, horizon, float(gamma), float(omega))
 
 
 PLACES = ("box", "obstacle", "edge", "centre", "wall", "corner", "beside", "outside", "target")
@@ -94,9 +100,8 @@ def drawn_state(rng: np.random.Generator, nmpc: Nmpc) -> np.ndarray:
         x, y, clearance = (one[0] for one in nmpc.task.discs)
         angle, edge = rng.uniform(-np.pi, np.pi), 10 ** rng.uniform(-8, -1) * rng.choice([-1, 1])
         radius = {"obstacle": clearance / 2 * rng.random(), "edge": clearance / 2 + edge}
-        state[:2] = np.array([x, y]) + radius.get(place, 0) * np.array(
-            [np.cos(angle), np.sin(angle)]
-        )
+        away = radius.get(place, 0)
+        state[:2] = x + away * np.cos(angle), y + away * np.sin(angle)
     elif place == "wall":
         state[rng.integers(2)] = rng.choice([-3, 9]) + rng.choice([0, 1e-9, -1e-9, 1e-6, -1e-6])
     elif place == "corner":
@@ -147,15 +152,16 @@ def drawn(rng: np.random.Generator, nmpc: Nmpc) -> Problem:
 
 @cache
 def conditions(ocp: Ocp) -> ca.Function:
-    """Objective, constraints, and the Lagrangian's gradients in z and theta, of (z, p, lam)."""
+    """Objective and its steepest slope, constraints, and the Lagrangian's gradients in z, theta."""
     value, lam = lagrangian(ocp)
-    slopes = [ca.gradient(value, ocp.variables), ca.gradient(value, ocp.theta)]
-    arguments = [ocp.variables, ocp.parameters, lam]
-    return ca.Function("conditions", arguments, [ocp.objective, ocp.constraints, *slopes])
+    slope = ca.gradient(ocp.objective, ocp.variables)[ocp.states.ravel().tolist()]
+    found = [ocp.objective, ca.norm_inf(slope), ocp.constraints]
+    found += [ca.gradient(value, ocp.variables), ca.gradient(value, ocp.theta)]
+    return ca.Function("conditions", [ocp.variables, ocp.parameters, lam], found)
 
 
 def unit(theta: np.ndarray) -> float:
-    """What the solver divides costs by, so that no weight exceeds 1."""
+    """The largest weight of the costs, and at least 1."""
     return max(1.0, (theta**2).max())
 
 
@@ -175,16 +181,40 @@ def box_weight(solution: Solution) -> float:
     return multiplier[np.argmax(np.where(of_box, beyond, -np.inf))]
 
 
-def residual(solution: Solution) -> float:
+def beyond(solution: Solution) -> np.ndarray:
+    """How far the predicted states leave the box."""
+    beyond, _, of_box = sides(solution)
+    return np.maximum(beyond[of_box], 0)
+
+
+def total(solution: Solution) -> float:
+    """The value and what the box charges."""
+    return solution.value + box_weight(solution) * beyond(solution).sum()
+
+
+def judged(nmpc: Nmpc, solution: Solution) -> None:
+    """Everything that holds for whatever is called solved."""
+    arguments = solution.primal, solution.parameters, solution.constraint_duals
+    parts = (part.full().ravel() for part in conditions(solution.ocp)(*arguments))
+    (value,), (steepest,), g, slope, features = parts
+    assert np.isfinite([solution.value, solution.violation, *solution.point]).all()
+    assert (nmpc.plant.lower <= solution.inputs).all()
+    assert (solution.inputs <= nmpc.plant.upper).all()
+    assert solution.violation == pytest.approx(beyond(solution).max(initial=0), abs=1e-9)
+    assert residual(solution, steepest, g, slope) <= KKT
+    assert solution.value == pytest.approx(value, rel=1e-9, abs=1e-12)
+    scale = np.abs(features).max(initial=1)
+    np.testing.assert_allclose(solution.features, features, rtol=0, atol=1e-9 * scale)
+
+
+def residual(solution: Solution, steepest: float, g: np.ndarray, slope: np.ndarray) -> float:
     """The largest violation of the KKT conditions of Eq. (2) with the box as a penalty.
 
     Stationarity is relative to the largest multiplier; of a multiplier and its distance, the
-    product counts, in the unit of the costs.
+    product counts, in the unit by which `kernel.scale` divides the costs.
     """
-    scale, weight = unit(solution.theta), box_weight(solution)
-    z, lam, nu = solution.primal, solution.constraint_duals, solution.bound_duals
-    parts = conditions(solution.ocp)(z, solution.parameters, lam)
-    _, g, slope, _ = (part.full().ravel() for part in parts)
+    scale, weight = max(unit(solution.theta), steepest / STEEP), box_weight(solution)
+    lam, nu = solution.constraint_duals, solution.bound_duals
     equality = solution.ocp.equality
     beyond, multiplier, of_box = sides(solution)
     multiplier[solution.ocp.slacks[0]] = 0  # nothing is planned about them  # departure L
@@ -205,27 +235,23 @@ def residual(solution: Solution) -> float:
     return float(max(np.abs(violation).max(initial=0) for violation in violations))
 
 
-def beyond(solution: Solution) -> np.ndarray:
-    """How far the predicted states leave the box."""
-    beyond, _, of_box = sides(solution)
-    return np.maximum(beyond[of_box], 0)
-
-
 @cache
 def penalised(ocp: Ocp) -> tuple[ca.Function, dict[str, np.ndarray]]:
     """Ipopt on Eq. (2) with the box as a penalty, and its bounds; the last parameter is W."""
     box = np.zeros(ocp.lower.size, bool)
     box[ocp.states[1:]] = True
     z, weight = ocp.variables, ca.SX.sym("weight")
-    over = [(-1, a, ocp.lower[a]) for a in np.flatnonzero(box & np.isfinite(ocp.lower))]
-    over += [(1, a, ocp.upper[a]) for a in np.flatnonzero(box & np.isfinite(ocp.upper))]
+    over = [
+        sign * (z[int(a)] - bounds[a])
+        for sign, bounds in ((-1, ocp.lower), (1, ocp.upper))
+        for a in np.flatnonzero(box & np.isfinite(bounds))
+    ]
     t = ca.SX.sym("t", len(over))
-    left = [sign * (z[int(a)] - limit) - t[i] for i, (sign, a, limit) in enumerate(over)]
     nlp = {
         "x": ca.vertcat(z, t),
         "p": ca.vertcat(ocp.parameters, weight),
         "f": ocp.objective + weight * ca.sum1(t),
-        "g": ca.vertcat(ocp.constraints, *left),
+        "g": ca.vertcat(ocp.constraints, ca.vertcat(*over) - t),
     }
     exact = {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 1000}
     exact |= {"max_wall_time": 10.0, "bound_relax_factor": 0.0, "acceptable_iter": 0}
@@ -238,40 +264,17 @@ def penalised(ocp: Ocp) -> tuple[ca.Function, dict[str, np.ndarray]]:
     return ca.nlpsol("penalised", "ipopt", nlp, {"print_time": False, "ipopt": exact}), bounds
 
 
-def total(solution: Solution) -> float:
-    """The value and what the box charges."""
-    return solution.value + box_weight(solution) * beyond(solution).sum()
-
-
 def ipopts(solution: Solution, inputs: np.ndarray | float = 0.0) -> tuple[float, np.ndarray] | None:
     """Ipopt's `total` and states for the same problem, from these inputs; None if it fails."""
     ocp = solution.ocp
     solver, bounds = penalised(ocp)
-    z = np.zeros(ocp.lower.size)
-    z[ocp.states], z[ocp.inputs] = solution.state, inputs
+    start = np.zeros(bounds["lbx"].size)
+    start[ocp.states], start[ocp.inputs] = solution.state, inputs
     weight = box_weight(solution) if solution.violation > 1e-6 else 1e4 * unit(solution.theta)
-    start = np.append(z, np.zeros(bounds["lbx"].size - z.size))
     found = solver(x0=start, p=np.append(solution.parameters, weight), **bounds)
     if not solver.stats()["success"]:
         return None
     return float(found["f"]), found["x"].full().ravel()[ocp.states]
-
-
-def judged(nmpc: Nmpc, solution: Solution) -> None:
-    """Everything that holds for whatever is called solved."""
-    plant = nmpc.plant
-    assert np.isfinite([solution.value, solution.violation]).all()
-    assert np.isfinite(solution.point).all()
-    assert np.isfinite(solution.features).all()
-    assert (plant.lower <= solution.inputs).all()
-    assert (solution.inputs <= plant.upper).all()
-    assert solution.violation == pytest.approx(beyond(solution).max(initial=0), abs=1e-9)
-    assert residual(solution) <= KKT
-    arguments = solution.primal, solution.parameters, solution.constraint_duals
-    value, _, _, features = conditions(solution.ocp)(*arguments)
-    assert solution.value == pytest.approx(float(value), rel=1e-9, abs=1e-12)
-    scale = np.abs(features.full()).max(initial=1)
-    np.testing.assert_allclose(solution.features, features.full().ravel(), atol=1e-9 * scale)
 
 
 # A thousand problems
@@ -290,7 +293,7 @@ def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(
     name, layouts, failures, mass
 ):
     """About one in a thousand is given up, and says so; `nmpcrl bench --sweep` tries 100,000."""
-    ended = {"failed": 0, "restarted": 0}
+    failed = restarted = 0
     for layout in range(layouts):
         rng = np.random.default_rng([1, layout])
         nmpc = controller(rng, ROBOT if name == "robot" else mass)
@@ -299,12 +302,12 @@ def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(
             try:
                 solution = problem.solve(nmpc)
             except SolverError:
-                ended["failed"] += 1
+                failed += 1
                 continue
             judged(nmpc, solution)
-            ended["restarted"] += solution.status == "restarted"
-    assert ended["failed"] <= failures
-    assert ended["restarted"] <= 12
+            restarted += solution.status == "restarted"
+    assert failed <= failures
+    assert restarted <= 12
 
 
 @pytest.mark.slow
@@ -334,49 +337,30 @@ def test_values_are_ipopts_or_those_of_another_minimum():
     assert worse <= 0.03 * compared
 
 
-def worse_than_ipopts_best(layouts: range, starts: tuple[int, ...]) -> tuple[int, dict[int, int]]:
-    """How many cold solves, and of those with so many starts, how many are 0.1 % above Ipopt.
-
-    The best of ten: from standing still, and nine times from other inputs.
-    """
-    compared, worse = 0, dict.fromkeys(starts, 0)
-    for layout in layouts:
-        rng = np.random.default_rng([5, layout])
-        nmpc = controller(rng)
-        solvers = {
-            k: Nmpc(
-                nmpc.plant,
-                nmpc.task,
-                horizon=nmpc.horizon,
-                gamma=nmpc.gamma,
-                slack_weight=nmpc.slack_weight,
-                solver=Riccati(starts=k),
-            )
-            for k in starts
-        }
-        for _ in range(10):
-            problem = drawn(rng, nmpc)
-            try:
-                found = {k: problem.solve(one) for k, one in solvers.items()}
-            except SolverError:
-                continue
-            standing = found[starts[0]]
-            if standing.violation > 1e-6:
-                continue
-            others = [random_inputs(ROBOT, seed, nmpc.horizon) for seed in range(20, 29)]
-            values = [one[0] for u in (0.0, *others) if (one := ipopts(standing, u))]
-            if not values:
-                continue
-            compared += 1
-            for k, solution in found.items():
-                worse[k] += solution.value - min(values) > 1e-3 * max(abs(min(values)), 1e-6)
-    return compared, worse
-
-
 @pytest.mark.weekly
 @pytest.mark.slow
 def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
-    compared, worse = worse_than_ipopts_best(range(4), starts=(1, 9))
+    """Ipopt from standing still, and nine times from other inputs; worse is by 0.1 %."""
+    compared, worse = 0, {1: 0, 9: 0}
+    for layout in range(4):
+        rng = np.random.default_rng([5, layout])
+        nmpc = controller(rng)
+        solvers = {starts: like(nmpc, solver=Riccati(starts=starts)) for starts in worse}
+        for _ in range(10):
+            problem = drawn(rng, nmpc)
+            try:
+                found = {starts: problem.solve(one) for starts, one in solvers.items()}
+            except SolverError:
+                continue
+            if found[1].violation > 1e-6:
+                continue
+            others = [random_inputs(ROBOT, seed, nmpc.horizon) for seed in range(20, 29)]
+            values = [one[0] for u in (0.0, *others) if (one := ipopts(found[1], u))]
+            if not values:
+                continue
+            compared += 1
+            for starts, solution in found.items():
+                worse[starts] += solution.value - min(values) > 1e-3 * max(abs(min(values)), 1e-6)
     assert compared >= 20
     assert worse[9] <= 0.03 * compared
     assert worse[9] <= worse[1]
@@ -384,20 +368,21 @@ def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
 
 @pytest.mark.slow
 def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
-    same = worse = 0
+    """One start ends where Ipopt's does; several, the default, may find lower minima."""
+    alone, same, worse = paper.nmpc(solver=Riccati(starts=1)), 0, 0
     for state, theta in draw(100, seed=40):
-        solution = controllers["riccati"].solve(state, theta)
-        assert solution.violation <= 1e-6
+        solution, best = (nmpc.solve(state, theta) for nmpc in (alone, controllers["riccati"]))
+        assert max(solution.violation, best.violation) <= 1e-6
         ipopt = controllers["ipopt"].solve(state, theta)
+        worse += best.value > ipopt.value * (1 + 1e-6)
         if solution.value != pytest.approx(ipopt.value, rel=1e-6):
             assert np.abs(solution.states - ipopt.states).max() > 1e-2
-            worse += solution.value > ipopt.value
             continue
         same += 1
         scale = np.abs(ipopt.features).max()
         np.testing.assert_allclose(solution.features, ipopt.features, atol=1e-5 * scale)
-    assert same >= 85  # of the others, several starts find lower minima than Ipopt's one
-    assert worse <= 2
+    assert same >= 92
+    assert worse <= 1
 
 
 @pytest.mark.weekly
@@ -408,14 +393,7 @@ def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_
     for layout in range(24):
         rng = np.random.default_rng([3, layout])
         nmpc = controller(rng, longest=10)
-        ipopt = Nmpc(
-            nmpc.plant,
-            nmpc.task,
-            horizon=nmpc.horizon,
-            gamma=nmpc.gamma,
-            slack_weight=nmpc.slack_weight,
-            solver="ipopt",
-        )
+        ipopt = like(nmpc, solver="ipopt")
         for _ in range(8):
             state, theta = drawn_state(rng, nmpc), drawn_theta(rng, nmpc)
             warm_start = nmpc.solve(state, theta)
@@ -436,38 +414,6 @@ def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_
     assert worse <= 0.005 * compared
 
 
-@pytest.mark.slow
-def test_features_are_the_differences_of_the_value_away_from_kinks():
-    """Along drawn directions; a solve that falls into another minimum shows in the curvature."""
-    compared, jumped, step = 0, 0, 1e-4
-    for layout in range(20):
-        rng = np.random.default_rng([4, layout])
-        nmpc = controller(rng, longest=10)
-        for _ in range(10):
-            problem = drawn(rng, nmpc)
-            beyond = nmpc.task.overlap(problem.state) + problem.theta[-1]
-            if np.abs(beyond).min(initial=1) < 1e-2:
-                continue
-            solution = problem.solve(nmpc)
-            if solution.violation > 1e-6:  # then the features are those of `total`
-                continue
-            along = rng.normal(size=9) * np.maximum(np.abs(problem.theta), 1e-2)
-            above, below = (
-                problem._replace(theta=problem.theta + d).solve(nmpc, solution).value
-                for d in (step * along, -step * along)
-            )
-            slope, size = (above - below) / (2 * step), abs(solution.features) @ abs(along)
-            bend = (above - 2 * solution.value + below) / step
-            if abs(bend) > 0.05 * size + 1e-6 * unit(problem.theta):
-                jumped += 1
-                continue
-            compared += 1
-            exact = solution.features @ along
-            assert slope == pytest.approx(exact, abs=1e-5 * size + 1e-5 * unit(problem.theta))
-    assert compared >= 100
-    assert jumped <= 6
-
-
 # Whatever hypothesis thinks of
 
 coordinate, weight = st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)
@@ -484,45 +430,37 @@ typical = st.builds(
     action=st.none(),
 )
 LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30)]
+MIRROR = np.array([1.0, -1.0, -1.0])
 
 
 @pytest.mark.slow
 def test_whatever_is_asked_the_answer_is_a_solution_and_seldom_an_error():
-    ended = {"solved": 0, "failed": 0}
+    solved = failed = 0
 
     @settings(derandomize=True, deadline=None, max_examples=400)
     @given(problem=problems | typical, nmpc=st.sampled_from(LAYOUTS))
     def ask(problem, nmpc):
+        nonlocal solved, failed
         try:
             solution = problem.solve(nmpc)
         except SolverError:
-            ended["failed"] += 1
+            failed += 1
             return
         judged(nmpc, solution)
-        ended["solved"] += 1
+        solved += 1
 
     ask()
-    assert ended["failed"] <= 0.1 * ended["solved"]
+    assert failed <= 0.1 * solved
 
 
 def mirrored(nmpc: Nmpc) -> Nmpc:
     """The same world with y for -y."""
-    task, mirror = nmpc.task, np.array([1.0, -1.0, -1.0])
-    lower, upper = np.sort([task.lower * mirror, task.upper * mirror], axis=0)
-    other = Task(
-        start=task.start * mirror,
-        target=task.target * mirror,
-        lower=lower,
-        upper=upper,
-        obstacles=tuple(Obstacle(one.x, -one.y, one.diameter) for one in task.obstacles),
-    )
-    return Nmpc(
-        nmpc.plant,
-        other,
-        horizon=nmpc.horizon,
-        gamma=nmpc.gamma,
-        slack_weight=nmpc.slack_weight,
-    )
+    task = nmpc.task
+    lower, upper = np.sort([task.lower * MIRROR, task.upper * MIRROR], axis=0)
+    target = task.target * MIRROR
+    discs = tuple(Obstacle(one.x, -one.y, one.diameter) for one in task.obstacles)
+    fields = {"start": target, "target": target, "lower": lower, "upper": upper}
+    return like(nmpc, replace(task, obstacles=discs, **fields))
 
 
 PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
@@ -531,11 +469,10 @@ PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(problem=typical, pair=st.sampled_from(PAIRS))
 def test_a_mirrored_world_has_mirrored_plans(problem, pair):
-    mirror = np.array([1.0, -1.0, -1.0])
     one = problem.solve(pair[0])
-    other = problem._replace(state=problem.state * mirror).solve(pair[1])
+    other = problem._replace(state=problem.state * MIRROR).solve(pair[1])
     assert other.value == pytest.approx(one.value, rel=1e-6, abs=1e-7)
-    np.testing.assert_allclose(other.states[-1] * mirror, one.states[-1], atol=1e-2)
+    np.testing.assert_allclose(other.states[-1] * MIRROR, one.states[-1], atol=1e-2)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
@@ -552,24 +489,12 @@ def test_solving_again_from_the_solution_costs_an_iteration_or_two(problem, nmpc
 
 def remembered(case: dict, mass: Plant) -> tuple[Nmpc, Problem]:
     lower, upper = (
-        np.array([sign * np.inf if v is None else v for v in case[side]])
-        for side, sign in (("lower", -1), ("upper", 1))
+        np.nan_to_num(np.array(case[side], float), nan=free)
+        for side, free in (("lower", -np.inf), ("upper", np.inf))
     )
-    task = Task(
-        start=np.array(case["target"]),
-        target=np.array(case["target"]),
-        lower=lower,
-        upper=upper,
-        obstacles=tuple(Obstacle(*disc) for disc in case["obstacles"]),
-        weights=np.ones(lower.size),
-    )
-    nmpc = Nmpc(
-        ROBOT if lower.size == 3 else mass,
-        task,
-        horizon=case["horizon"],
-        gamma=case["gamma"],
-        slack_weight=case["slack_weight"],
-    )
+    plant, how = ROBOT if lower.size == 3 else mass, ("horizon", "gamma", "slack_weight")
+    target, discs = np.array(case["target"]), case["obstacles"]
+    nmpc = world(plant, target, lower, upper, discs, *(case[name] for name in how))
     action = None if case["action"] is None else np.array(case["action"])
     return nmpc, Problem(np.array(case["state"]), np.array(case["theta"]), action)
 
