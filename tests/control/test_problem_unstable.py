@@ -20,32 +20,22 @@ def swing(x, u, gravity):
 
 def pendulum(horizon: int, bound: float = 5.0) -> Problem:
     return Problem(
-        states=2,
-        inputs=1,
-        horizon=horizon,
-        theta={"gravity": 9.81, "price": 0.01},
+        states=2, inputs=1, horizon=horizon, theta={"gravity": 9.81, "price": 0.01},
         model=lambda x, u, th: rk4(lambda x, u: swing(x, u, th["gravity"]), x, u, PERIOD),
         stage=lambda x, u, th: x[0] ** 2 + 0.1 * x[1] ** 2 + th["price"] * u[0] ** 2,
-        terminal=lambda x, th: 50 * x[0] ** 2 + 5 * x[1] ** 2,
-        lower=-bound,
-        upper=bound,
-    )
+        terminal=lambda x, th: 50 * x[0] ** 2 + 5 * x[1] ** 2, lower=-bound, upper=bound,
+    )  # fmt: skip
 
 
-def scalar(horizon: int = 3, model=None, stage=None, bound=np.inf, size=1.0, a=1.5) -> Problem:
+def scalar(horizon: int, stage=None, bound=np.inf, size=1.0, a=1.5) -> Problem:
     return Problem(
-        states=1,
-        inputs=1,
-        horizon=horizon,
-        theta={"a": a, "size": size},
-        model=model or (lambda x, u, th: th["a"] * x + u),
+        states=1, inputs=1, horizon=horizon, theta={"a": a, "size": size}, lower=-bound,
+        upper=bound, model=lambda x, u, th: th["a"] * x + u,
         stage=stage or (lambda x, u, th: x**2 + u**2),
-        lower=-bound,
-        upper=bound,
-    )
+    )  # fmt: skip
 
 
-def cart_pole(horizon: int, swing_up: bool) -> Problem:
+def cart_pole(horizon: int) -> Problem:
     """A pole of 0.1 kg and 0.5 m on a cart of 1 kg: position, angle from upright, and speeds."""
 
     def motion(x, u):
@@ -55,24 +45,16 @@ def cart_pole(horizon: int, swing_up: bool) -> Problem:
         pole = (-u[0] * c - spin * c + 1.1 * 9.81 * s) / (0.5 * mass)
         return ca.vertcat(x[2], x[3], cart, pole)
 
-    def cost(x, weights):
-        bend = 2 * (1 - ca.cos(x[1])) if swing_up else x[1] ** 2
+    def cost(x, *weights):
+        bend = 2 * (1 - ca.cos(x[1]))
         return ca.dot(ca.DM(weights), ca.vertcat(x[0] ** 2, bend, x[2] ** 2, x[3] ** 2))
 
-    path, end = [1, 10, 0.1, 0.1], [10, 100, 1, 10]
-    if swing_up:
-        path, end = [1, 5, 0.01, 0.01], [10, 100, 1, 5]
     return Problem(
-        states=4,
-        inputs=1,
-        horizon=horizon,
-        theta={"price": 0.001 if swing_up else 0.01},
+        states=4, inputs=1, horizon=horizon, theta={"price": 0.001}, lower=-20.0, upper=20.0,
         model=lambda x, u, th: rk4(motion, x, u, 0.05),
-        stage=lambda x, u, th: cost(x, path) + th["price"] * u[0] ** 2,
-        terminal=lambda x, th: cost(x, end),
-        lower=-20.0,
-        upper=20.0,
-    )
+        stage=lambda x, u, th: cost(x, 1, 5, 0.01, 0.01) + th["price"] * u[0] ** 2,
+        terminal=lambda x, th: cost(x, 10, 100, 1, 5),
+    )  # fmt: skip
 
 
 def among_moving_discs() -> Problem:
@@ -81,20 +63,14 @@ def among_moving_discs() -> Problem:
     discs = np.stack([np.hstack([2 + 0.1 * i, 0 * i + 0.2]),
                       np.hstack([3.5 - 0.15 * i, 0.05 * i - 0.5])], axis=1)  # fmt: skip
     return Problem(
-        states=3,
-        inputs=2,
-        horizon=20,
-        gamma=0.97,
-        theta={"q": np.array([1.0, 1.0, 0.1]), "c": 0.0},
+        states=3, inputs=2, horizon=20, gamma=0.97, lower=[-1.0, -1.5], upper=[1.0, 1.5],
+        theta={"q": np.array([1.0, 1.0, 0.1]), "c": 0.0}, data={"discs": Series(discs)},
         model=lambda x, u, th: rk4(
             lambda x, u: ca.vertcat(u[0] * ca.cos(x[2]), u[0] * ca.sin(x[2]), u[1]), x, u, 0.2
         ),
         stage=lambda x, u, th: ca.dot(th["q"], (x - ca.DM([5, 0, 0])) ** 2) + ca.sumsqr(u) / 10,
         soft=[Soft(lambda x, u, th, d: 1 - ca.sumsqr(x[:2] - d["discs"]) / 0.64 + th["c"],
                    weight=100.0, each="discs")],
-        lower=[-1.0, -1.5],
-        upper=[1.0, 1.5],
-        data={"discs": Series(discs)},
     )  # fmt: skip
 
 
@@ -105,8 +81,7 @@ FREE = [(-1.0, 0.2, 0.0), (0.5, 1.5, -1.0), (1.0, -0.8, 2.0), (1.2, 0.3, 0.1), (
 LINE = [(-2.0,), (-0.1,), (0.01,), (2.0,)]
 HELD = {
     **{f"pendulum {N}": (pendulum(N), ANGLES) for N in (1, 10, 30, 60, 100)},
-    **{f"cart-pole near upright {N}": (cart_pole(N, False), NEAR) for N in (25, 60, 100)},
-    **{f"cart-pole that swings up {N}": (cart_pole(N, True), HANGING) for N in (25, 60, 100)},
+    **{f"cart-pole {N}": (cart_pole(N), NEAR + HANGING) for N in (25, 60, 100)},
     **{f"x+ = {a} x + u": (scalar(40, bound=5.0, a=a), LINE) for a in (1.1, 1.5, 2.0)},
     "moving discs": (among_moving_discs(), FREE),
 }
@@ -142,13 +117,17 @@ def plant():
 
 
 @pytest.mark.parametrize("horizon", [20, 60, 100])
-@pytest.mark.parametrize("state", [(0.05, 0.0), (0.2, 0.0), (-0.4, 0.5)])
+@pytest.mark.parametrize("state", [(0.1, 0.0), (-0.4, 0.5)])
 def test_a_pendulum_that_stands_is_planned_to_stand(horizon, state):
-    problem = pendulum(horizon)
-    found, fatrop = (Nmpc(problem, solver=name).solve(state, problem.theta)
-                     for name in ("riccati", "fatrop"))  # fmt: skip
-    assert found.value == pytest.approx(fatrop.value, rel=1e-6)
-    np.testing.assert_allclose(found.features, fatrop.features, rtol=1e-5)
+    """With fatrop's value, and the derivatives of dense algebra."""
+    problem, along = pendulum(horizon), np.array([1.0, 0.01])
+    ours, dense = (Nmpc(problem, solver=name) for name in ("riccati", "fatrop"))
+    found, other = (nmpc.solve(state, problem.theta) for nmpc in (ours, dense))
+    assert found.value == pytest.approx(other.value, rel=1e-6)
+    np.testing.assert_allclose(found.features, other.features, rtol=1e-5)
+    product = dense.value_hessian(other) @ along
+    np.testing.assert_allclose(ours.value_hessian_times(found, along), product, rtol=1e-4)
+    np.testing.assert_allclose(ours.policy_jacobian(found), dense.policy_jacobian(other), rtol=1e-4)
 
 
 @pytest.mark.parametrize("horizon", [20, 60])
@@ -160,18 +139,6 @@ def test_a_pendulum_that_is_pushed_is_held_by_warm_solves_as_by_cold_ones(plant,
         assert warm.value <= cold.value * (1 + 1e-6)
         state = plant(state, warm.action)
     assert abs(state[0]) < 0.5
-
-
-@pytest.mark.parametrize("horizon", [20, 60, 100])
-def test_derivatives_of_a_standing_pendulum_are_those_of_dense_algebra(horizon):
-    problem = pendulum(horizon)
-    ours, dense = (Nmpc(problem, solver=name) for name in ("riccati", "fatrop"))
-    found, other = (nmpc.solve([0.1, 0.0], problem.theta) for nmpc in (ours, dense))
-    along = np.array([1.0, 0.01])
-    np.testing.assert_allclose(
-        ours.value_hessian_times(found, along), dense.value_hessian(other) @ along, rtol=1e-4
-    )
-    np.testing.assert_allclose(ours.policy_jacobian(found), dense.policy_jacobian(other), rtol=1e-4)
 
 
 @pytest.mark.usefixtures("interpreted")
@@ -188,20 +155,10 @@ def test_an_unstable_linear_plant_costs_what_riccatis_recursion_says(horizon, fi
 
 
 @pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("act", [ca.fabs, lambda u: u**2])
-def test_a_plan_does_not_stay_at_a_maximum(act):
-    """A store that leaks is charged by an even function of the input, so that 0 is stationary."""
-    problem = scalar(
-        model=lambda x, u, th: 0.5 * x + act(u), stage=lambda x, u, th: (x - 2) ** 2, bound=3.0
-    )
-    assert Nmpc(problem).solve([0.0], problem.theta).value == pytest.approx(4.0, abs=1e-6)
-
-
-@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("size", [1.0, 1e4, 1e8])
 def test_a_cost_that_is_flat_at_rest_and_steep_elsewhere_is_scaled(size):
-    problem = scalar(12, stage=lambda x, u, th: th["size"] * (x**4 + u**4), bound=1.0, size=size)
-    nmpc, unit = Nmpc(problem), scalar(12, stage=lambda x, u, th: x**4 + u**4, bound=1.0)
+    problem = scalar(12, lambda x, u, th: th["size"] * (x**4 + u**4), bound=1.0, size=size)
+    nmpc, unit = Nmpc(problem), scalar(12, lambda x, u, th: x**4 + u**4, bound=1.0)
     for state in (-1.5, 0.3, 1.9):
         value = Nmpc(unit).solve([state], unit.theta).value
         assert nmpc.solve([state], problem.theta).value == pytest.approx(size * value, rel=1e-6)
@@ -234,6 +191,6 @@ def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
 
 @pytest.mark.usefixtures("interpreted")
 def test_what_no_solver_solves_is_an_error_of_the_one_that_was_asked():
-    problem = scalar(3, stage=lambda x, u, th: -(u**2) - x**2)
+    problem = scalar(3, lambda x, u, th: -(u**2) - x**2)
     with pytest.raises(SolverError, match="riccati"):
         Nmpc(problem, solver=replace(Riccati(), starts=1)).solve([1.0], problem.theta)

@@ -103,7 +103,7 @@ def test_a_parameter_may_be_as_large_as_it_starts():
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-7, 1e5])
 @pytest.mark.parametrize("of", ["a state of that unit", "a state", "an input"])
 def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver, unit, of):
-    """dV/dm has the price where h is 0.4 units; where it is 0, as `ties_active` says."""
+    """dV/dm has the price where h is 1e-4 units; where it is 0, as `ties_active` says."""
     size, given = (unit if "that unit" in of else 1.0), of == "an input"
     problem = Problem(
         states=1, inputs=1, horizon=3, theta={"m": 0.5}, lower=-1.0, upper=1.0, scale=size,
@@ -114,7 +114,7 @@ def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver,
     )  # fmt: skip
     for active in (False, True):
         nmpc = Nmpc(problem, solver=solver, ties_active=active)
-        for beyond, price in ((0.4, 10.0), (0.0, 10.0 * active), (-0.4, 0.0)):
+        for beyond, price in ((1e-4, 10.0), (0.0, 10.0 * active), (-1e-4, 0.0)):
             start = np.array([0.5 - beyond])
             found = nmpc.solve(size * start, problem.theta, action=start if given else None)
             assert found.features == pytest.approx(price)

@@ -79,9 +79,9 @@ def test_a_solution_of_any_solver_is_a_warm_start_for_any_other(
     assert same >= 5
 
 
-def beside(solver, inward=0.0, **options):
-    """A controller that starts on the boundary of two obstacles in one place, or `inward` of it."""
-    radius = 1.25 * np.sqrt(1.1) - inward
+def beside(solver, **options):
+    """A controller that starts on the boundary of two obstacles in one place."""
+    radius = 1.25 * np.sqrt(1.1)
     start = np.array([2 + radius * np.cos(0.3), 2 + radius * np.sin(0.3), 0.3])
     task = replace(paper.task(), start=start, obstacles=(Obstacle(2.0, 2.0),) * 2)
     return Nmpc(differential_drive(), task, solver=solver, **options)
@@ -102,18 +102,6 @@ def test_on_a_boundary_the_features_are_the_lower_slope_of_a_kink_or_with_ties_t
     np.testing.assert_array_equal(other.multipliers.slacks[0], 0)
     for nmpc, found in ((outside, one), (inside, other)):
         assert nmpc.kkt_residual(found) < 1e-4
-
-
-@pytest.mark.parametrize("inward", [-1e-4, 1e-4])
-def test_off_a_boundary_ties_do_not_matter(solver, inward):
-    theta = np.append(paper.THETA_INIT[:8], 0.1)
-    one, other = (
-        nmpc.solve(nmpc.task.start, theta)
-        for nmpc in (beside(solver, inward, ties_active=active) for active in (False, True))
-    )
-    np.testing.assert_array_equal(other.features, one.features)
-    np.testing.assert_array_equal(other.point, one.point)
-    np.testing.assert_allclose(one.multipliers.obstacles[0], OMEGA * (inward > 0))
 
 
 @of_casadi
@@ -177,24 +165,20 @@ def test_from_however_far_outside_the_box_a_solve_ends(solver):
     assert ended.stdout.count("ValueError") > 0
 
 
-def store(act, soft=()):
-    """A store that leaks half and is charged by act(u); wherever it is, a step fills it."""
-    return Problem(
-        states=1, inputs=1, horizon=3, gamma=0.9, theta={"target": 2.0},
-        model=lambda x, u, th: 0.5 * x + act(u), stage=lambda x, u, th: (x - th["target"]) ** 2,
-        terminal=lambda x, th: (x - th["target"]) ** 2, lower=-3.0, upper=3.0, soft=soft,
-    )  # fmt: skip
-
-
-@of_casadi
+@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("act", [ca.fabs, lambda u: u**2, lambda u: 2 - 2 * ca.cos(u)])
 @pytest.mark.parametrize("soft", [(), [Soft(lambda x, u, th: x - 50.0)]])
 def test_no_plan_stays_at_a_maximum(solver, act, soft):
-    """At u = 0 nothing changes the store to first order; the value there is 13.76."""
-    nmpc = Nmpc(store(act, soft), solver=solver)
+    """At u = 0 nothing changes a store that leaks half to first order; the value there is 13.76."""
+    problem = Problem(
+        states=1, inputs=1, horizon=3, gamma=0.9, theta={"target": 2.0}, lower=-3.0, upper=3.0,
+        model=lambda x, u, th: 0.5 * x + act(u), stage=lambda x, u, th: (x - th["target"]) ** 2,
+        terminal=lambda x, th: (x - th["target"]) ** 2, soft=soft,
+    )  # fmt: skip
+    nmpc = Nmpc(problem, solver=solver)
     empty = nmpc.solve(np.zeros(1), np.zeros(1))
     assert empty.value == pytest.approx(0.0, abs=1e-6)
-    for warm_start in (None, empty):
+    for warm_start in (None, empty)[: 1 + (solver in CASADI_SOLVERS)]:  # riccati trusts the other
         assert nmpc.solve(np.zeros(1), np.full(1, 2.0), warm_start).value == pytest.approx(4.0)
 
 
