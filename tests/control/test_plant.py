@@ -106,16 +106,6 @@ def test_bounds_and_dynamics_may_be_lists():
     np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.parametrize("name", ["lower", "upper"])
-def test_a_plant_keeps_its_own_bounds(name):
-    given = {"lower": -BOUND, "upper": BOUND.copy()}
-    made = plant(**given)
-    given[name][:] = 0.5
-    assert abs(getattr(made, name)[0]) == BOUND[0]
-    with pytest.raises(ValueError, match="read-only"):
-        getattr(made, name)[0] = 0.0
-
-
 @pytest.mark.parametrize("solver", ["riccati", "fatrop", "ipopt"])
 @pytest.mark.usefixtures("interpreted")
 def test_a_plant_faster_than_its_period_is_said_to_be(solver):
