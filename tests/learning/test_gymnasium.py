@@ -8,18 +8,12 @@ import casadi as ca
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 from gymnasium.utils.env_checker import check_env
+from learning.small_runs import noise, run
 
 from nmpcrl.control import Ipopt, Nmpc, Problem
-from nmpcrl.learning import Exploration, Weights, as_gymnasium, evaluate, expected_sarsa, train
-from nmpcrl.study import paper
-
-THETA = np.array(paper.THETA_INIT)
-
-
-@pytest.fixture(scope="module")
-def robot() -> Nmpc:
-    return paper.nmpc()
+from nmpcrl.learning import as_gymnasium, evaluate, expected_sarsa
 
 
 @pytest.fixture(scope="module")
@@ -38,9 +32,9 @@ def car() -> Nmpc:
 class Slow(gymnasium.Env):
     """x+ = x + u + noise from a random start; terminated beyond 1, truncated after 6 steps."""
 
-    def __init__(self):
-        self.observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
-        self.action_space = gymnasium.spaces.Box(-1, 1, (1,), np.float32)
+    def __init__(self, bound=1, dtype=np.float32):
+        self.observation_space = Box(-9, 9, (2,), np.float32)
+        self.action_space = Box(-bound, bound, (1,), dtype)
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
@@ -48,45 +42,35 @@ class Slow(gymnasium.Env):
         return self.x, {}
 
     def step(self, action):
-        assert action.dtype == np.float32
-        assert action.shape == (1,)
+        assert (action.dtype, action.shape) == (np.float32, (1,))
         self.time += 1
         self.x = self.x + action + self.np_random.normal(scale=0.01, size=2).astype(np.float32)
         return self.x, float(self.x[0]) - 2, bool(self.x[0] > 1), self.time == 6, {}
 
 
-def run(nmpc, theta, plant, rng=0, shape=(3, 10)):
-    explore = Exploration.draw(np.random.default_rng(0), (*shape, nmpc.m), deviation=0.1)
-    learner = expected_sarsa(nmpc, 1e-7)
-    return list(train(learner, nmpc, Weights(theta), explore, plant=plant, rng=rng))
+def trained(nmpc, plant, rng=0, shape=(3, 10)):
+    explore = noise(*shape, nmpc.m, deviation=0.1)
+    return run(expected_sarsa(nmpc, 1e-7), nmpc, explore, plant=plant, rng=rng)
 
 
-def test_a_gymnasium_environment_is_a_plant(car):
-    steps = run(car, car.problem.theta, Slow())
+def test_a_gymnasium_environment_is_a_plant_that_is_truncated_or_terminated(car):
+    steps = trained(car, Slow(), shape=(10, 10))
     for step, later in pairwise(steps):
         if not step.last:
-            moved = later.state - step.state - step.action
-            assert abs(moved).max() < 0.1
+            assert abs(later.state - step.state - step.action).max() < 0.1
             assert step.cost == pytest.approx(2 - later.state[0])
-
-
-def test_truncated_and_terminated_are_told_apart(car):
-    steps = run(car, car.problem.theta, Slow(), shape=(10, 10))
     ends = [step for step in steps if step.last]
-    assert all(step.time == 5 for step in ends if not step.end)
     assert {step.end for step in ends} == {True, False}
     for step in ends:
+        assert step.end or step.time == 5
         assert (step.update.successor.value == 0) == step.end
 
 
 def test_the_seeds_of_an_environment_come_from_the_generator(car):
-    first, again, other = (
-        [step.state for step in run(car, car.problem.theta, Slow(), rng=rng)] for rng in (1, 1, 2)
-    )
+    first, again, other = ([s.state for s in trained(car, Slow(), rng=rng)] for rng in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
-    starts = {tuple(step.state) for step in run(car, car.problem.theta, Slow()) if step.time == 0}
-    assert len(starts) == 3
     assert not np.array_equal(first[0], other[0])
+    assert len({tuple(step.state) for step in trained(car, Slow()) if step.time == 0}) == 3
 
 
 def test_an_environment_of_gymnasiums_own_is_taken(car):
@@ -97,20 +81,13 @@ def test_an_environment_of_gymnasiums_own_is_taken(car):
     np.testing.assert_allclose(rollout.costs, 0.1 * rollout.actions[:, 0] ** 2, rtol=1e-5)
 
 
-def narrowed(bound, dtype):
-    """`Slow` with another action space."""
-    env = Slow()
-    env.action_space = gymnasium.spaces.Box(-bound, bound, (1,), dtype)
-    return env
-
-
 @pytest.mark.parametrize(
     ("make", "options", "message"),
     [
         (lambda: gymnasium.make("Pendulum-v1"), {}, "observation_space = .* must be a Box of 2 nu"),
         (lambda: gymnasium.make("MountainCar-v0"), {}, r"= Discrete\(3\) must be a Box"),
-        (lambda: narrowed(0.5, np.float32), {}, r"between \[-0.5\] and \[0.5\], .* \[-1.\] and"),
-        (lambda: narrowed(9, int), {}, "action_space = .*int.* must hold floats"),
+        (lambda: Slow(0.5), {}, r"between \[-0.5\] and \[0.5\], .* \[-1.\] and"),
+        (lambda: Slow(9, int), {}, "action_space = .*int.* must hold floats"),
         (Slow, {"start": [0.0, 0.0]}, "draws its own start: leave start= out"),
     ],
 )
@@ -139,26 +116,20 @@ def test_ours_pass_gymnasiums_own_check(robot, car):
 
 
 def test_there_and_back_is_the_same_run(robot):
-    ours = run(robot, THETA, None, shape=(2, 8))
-    theirs = run(robot, THETA, as_gymnasium(robot), shape=(2, 8))
+    ours, theirs = (trained(robot, plant, shape=(2, 8)) for plant in (None, as_gymnasium(robot)))
     assert [step.cost for step in ours] == [step.cost for step in theirs]
     np.testing.assert_array_equal(ours[-1].weights.theta, theirs[-1].weights.theta)
 
 
-def test_an_episode_of_ours_is_truncated_after_its_steps(robot):
-    env = as_gymnasium(robot, steps=3)
-    env.reset(seed=0)
-    ends = [env.step(np.zeros(2))[2:4] for _ in range(3)]
-    assert ends == [(False, False), (False, False), (False, True)]
-
-
-def test_an_environment_of_ours_takes_an_agents_own_numbers(robot):
-    env, given = as_gymnasium(robot), np.array([0.5, -0.25], np.float32)
+def test_an_environment_of_ours_takes_an_agents_own_numbers_and_is_truncated_after_its_steps(robot):
+    env, given = as_gymnasium(robot, steps=3), np.array([0.5, -0.25], np.float32)
     found = []
     for action in (given, given.tolist(), given.astype(float)):
         env.reset(seed=0)
-        found.append(env.step(action)[0])
-        assert found[-1].dtype == float
+        states, _, *ends, _ = zip(*(env.step(action) for _ in range(3)), strict=True)
+        assert ends == [(False, False, False), (False, False, True)]
+        assert states[0].dtype == float
+        found.append(states)
     np.testing.assert_array_equal(found, [found[0]] * 3)
 
 
