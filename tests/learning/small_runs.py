@@ -1,5 +1,6 @@
-"""Short runs of learners: the paper's first theta, noise, and the steps of `train` as a list."""
+"""Short runs of learners, noise for them, and finite differences."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,3 +23,8 @@ def run(learner: Learner, nmpc: Nmpc, explore: Exploration, **how: Any) -> list[
     theta = THETA if nmpc.task else nmpc.problem.theta
     weights = Weights(theta, np.full(len(theta), paper.W_INIT))
     return list(train(learner, nmpc, weights, explore, **how))
+
+
+def differences(function: Callable[[Any], Any], at: Any, h: float = 1e-4) -> Any:
+    """Central differences, one row a component of `at`."""
+    return np.array([(function(at + e) - function(at - e)) / (2 * h) for e in h * np.eye(len(at))])

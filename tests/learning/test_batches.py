@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from learning.small_runs import differences, noise, run
 
 from nmpcrl.learning import (
     Adam,
     Descent,
-    Exploration,
     Learner,
     SecondSolve,
     Transition,
@@ -20,16 +20,9 @@ from nmpcrl.learning import (
     policy_gradient,
     random_direction,
     step_matched,
-    train,
 )
-from nmpcrl.study import paper
 
 THETA = np.array([1.0, 0.5, -1.0])
-
-
-def batch(controller, optimiser, every):
-    rule = batch_semi_gradient(optimiser, every)
-    return Learner("batch", SecondSolve(controller), rule, controller.gamma)
 
 
 def drawn(controller, count, theta=THETA):
@@ -51,7 +44,8 @@ def after(learner, transitions, theta=THETA):
 
 @pytest.mark.parametrize(("every", "count"), [(1, 1), (4, 4), (None, 4)])
 def test_theta_waits_for_a_full_batch_and_moves_by_its_mean(controller, every, count):
-    steps, learner = drawn(controller, count), batch(controller, Descent(0.1), every)
+    steps, rule = drawn(controller, count), batch_semi_gradient(Descent(0.1), every)
+    learner = Learner("batch", SecondSolve(controller), rule, 0.9)
     np.testing.assert_array_equal(after(learner, steps[:-1]), THETA)
     alone = [after(expected_sarsa(controller, 0.1), [step]) - THETA for step in steps]
     np.testing.assert_allclose(after(learner, steps), THETA + np.mean(alone, axis=0))
@@ -63,7 +57,8 @@ def test_a_batch_of_no_step_is_refused():
 
 
 def test_nothing_is_remembered_but_in_the_weights(controller):
-    shared, steps = batch(controller, Adam(0.1), 2), drawn(controller, 6)
+    rule, steps = batch_semi_gradient(Adam(0.1), 2), drawn(controller, 6)
+    shared = Learner("batch", SecondSolve(controller), rule, 0.9)
     first = second = Weights(THETA)
     for step in steps:  # two runs that take turns
         first = shared.step(first, step).weights
@@ -76,10 +71,8 @@ def test_lstd_q_fits_a_linear_value_to_its_targets_in_one_step(controller):
     steps = drawn(controller, 20)
     phi = np.array([step.state for step in steps])
     target = [step.cost + 0.9 * step.next_state @ THETA for step in steps]
-    exact = np.linalg.lstsq(phi, target)[0]
-    np.testing.assert_allclose(
-        after(lstd_q(controller, regularisation=1e-10), steps), exact, rtol=1e-6
-    )
+    fitted = after(lstd_q(controller, regularisation=1e-10), steps)
+    np.testing.assert_allclose(fitted, np.linalg.lstsq(phi, target)[0], rtol=1e-6)
     scale = np.array([1.0, 0.5, 2.0])
     trusted = after(lstd_q(controller, optimiser=TrustRegion(0.1, scale)), steps)
     assert np.linalg.norm((trusted - THETA) / scale) == pytest.approx(0.1)
@@ -100,21 +93,15 @@ def test_lstd_q_is_lstd_where_it_is_repeated(controller):
 
 def test_the_curvature_of_lstd_q_is_that_of_the_squared_error(quadratic):
     """Against finite differences of the gradient of mean((target - Q)^2) / 2, target held."""
-    steps, eps = drawn(quadratic, 4), 1e-6
+    steps = drawn(quadratic, 4)
     targets = [s.cost + 0.9 * quadratic.value(s.next_state, THETA) for s in steps]
 
     def gradient(theta):
-        return np.mean(
-            [
-                (quadratic.value(s.state, theta) - target) * quadratic.features(s.state, theta)
-                for s, target in zip(steps, targets, strict=True)
-            ],
-            axis=0,
-        )
+        errors = [quadratic.value(s.state, theta) - t for s, t in zip(steps, targets, strict=True)]
+        features = [quadratic.features(s.state, theta) for s in steps]
+        return np.transpose(features) @ errors / len(steps)
 
-    hessian = np.array(
-        [(gradient(THETA + eps * e) - gradient(THETA - eps * e)) / (2 * eps) for e in np.eye(3)]
-    )
+    hessian = differences(gradient, THETA, 1e-6)
     shift = 1e-3 + max(0, -np.linalg.eigvalsh(hessian)[0])
     expected = THETA - np.linalg.solve(hessian + shift * np.eye(3), gradient(THETA))
     np.testing.assert_allclose(after(lstd_q(quadratic, curvature=True), steps), expected, rtol=1e-3)
@@ -126,16 +113,14 @@ def filling(state, action, rng):
 
 
 def trained(learner, tank, episodes, steps):
-    noise = Exploration.draw(np.random.default_rng(0), (episodes, steps, 1), deviation=0.2)
     how = {"plant": filling, "start": [0.0], "rng": 5}
-    return list(train(learner, tank, Weights(tank.problem.theta), noise, **how))
+    return run(learner, tank, noise(episodes, steps, 1, deviation=0.2), **how)
 
 
 @pytest.mark.parametrize("make", [lambda nmpc: lstd_q(nmpc, 0.5, every=4), policy_gradient])
 def test_a_run_goes_on_from_the_weights_of_any_of_its_steps(tank, make):
     shared = make(tank)
     steps, again = (trained(shared, tank, 2, 6) for _ in range(2))
-    assert [step.last for step in steps] == [False] * 5 + [True] + [False] * 5 + [True]
     np.testing.assert_array_equal(steps[-1].weights.theta, again[-1].weights.theta)
     assert not np.array_equal(steps[-1].weights.theta, tank.problem.theta)
     assert steps[6].weights.memory.steps == (3 if shared.values_actions else 1)
@@ -158,5 +143,5 @@ def test_learners_keep_theta_within_the_bounds_of_the_problem(tank, make):
     assert len(set(gains)) > 1
 
 
-def test_the_papers_controller_has_no_bounds_of_theta():
-    assert expected_sarsa(paper.nmpc(), 1e-7).bounds is None
+def test_the_papers_controller_has_no_bounds_of_theta(robot):
+    assert expected_sarsa(robot, 1e-7).bounds is None

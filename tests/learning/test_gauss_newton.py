@@ -3,13 +3,12 @@
 import casadi as ca
 import numpy as np
 import pytest
+from learning.small_runs import THETA, differences, noise
 
 from nmpcrl.control import Nmpc, Parameter, Problem, SolverError, Task, differential_drive
 from nmpcrl.learning import Exploration, TrustRegion, Weights, evaluate, train
 from nmpcrl.learning.gauss_newton import closed_loop
-from nmpcrl.study import paper
 
-THETA = np.array(paper.THETA_INIT)
 STEPS = 12
 
 
@@ -58,68 +57,47 @@ def filling(state, action, rng):
 TANK = {"plant": filling, "start": [0.2]}
 
 
-def one_episode(nmpc, theta, noise, cost=None, **world):
+def one_episode(nmpc, theta, explore, cost=None, **world):
     """The summed cost, and the gradient and curvature of J that GN-J makes of the episode."""
     optimiser = Recorder()
     learner = closed_loop(nmpc, optimiser, cost=cost)
-    steps = list(train(learner, nmpc, Weights(theta), noise, **world))
+    steps = list(train(learner, nmpc, Weights(theta), explore, **world))
     return sum(step.cost for step in steps), optimiser.gradient, optimiser.curvature
-
-
-def noise(deviation, episodes=1):
-    return Exploration.draw(np.random.default_rng(1), (episodes, STEPS, 2), deviation=deviation)
-
-
-def assert_gradient(run, theta, h=1e-4):
-    """Against central differences of the cost of whole episodes, noise held."""
-    _, gradient, _ = run(theta)
-    for k, e in enumerate(h * np.eye(theta.size)):
-        slope = (run(theta + e)[0] - run(theta - e)[0]) / (2 * h)
-        assert gradient[k] == pytest.approx(slope, rel=2e-3, abs=2e-5)
 
 
 PUSHED = Exploration(np.array([[[9.0, 0.0], [0.0, 0.0]]]), np.ones((1, 2)))
 
 
-@pytest.mark.parametrize("drawn", [noise(0.02), PUSHED])
-def test_the_gradient_of_j_is_that_of_finite_differences(free, drawn):
-    """An input that noise took to its bound does not answer to theta."""
-    assert_gradient(lambda theta: one_episode(free, theta, drawn), THETA + 0.1)
-
-
-def test_the_gradient_of_j_of_a_problem_is_that_of_finite_differences(tank):
-    drawn = Exploration(noise(0.05).noise[..., :1], noise(0.05).scale)
-    assert_gradient(
-        lambda theta: one_episode(tank, theta, drawn, charged, **TANK), tank.problem.theta
-    )
+@pytest.mark.parametrize(
+    ("name", "explore", "world"),
+    [
+        ("free", noise(1, STEPS, deviation=0.02), {}),
+        ("free", PUSHED, {}),  # an input that noise took to its bound does not answer to theta
+        ("tank", noise(1, STEPS, 1, deviation=0.05), TANK | {"cost": charged}),
+    ],
+)
+def test_the_gradient_of_j_is_that_of_finite_differences(request, name, explore, world):
+    """Of the cost of whole episodes, noise held."""
+    nmpc = request.getfixturevalue(name)
+    theta = THETA + 0.1 if nmpc.task else nmpc.problem.theta
+    _, gradient, _ = one_episode(nmpc, theta, explore, **world)
+    slopes = differences(lambda theta: one_episode(nmpc, theta, explore, **world)[0], theta)
+    np.testing.assert_allclose(gradient, slopes, rtol=2e-3, atol=2e-5)
 
 
 def test_the_curvature_of_j_is_that_of_the_sensitivities(free):
     """2 S' diag(Q) S over the visited states, with S by finite differences of whole episodes."""
-    theta, h = THETA + 0.1, 1e-4
-    *_, curvature = one_episode(free, theta, noise(0.0))
-    ends = [
-        (evaluate(free, theta + e, STEPS).states - evaluate(free, theta - e, STEPS).states)
-        / (2 * h)
-        for e in h * np.eye(9)
-    ]
-    S = np.array(ends)  # (d, steps, n)
+    *_, curvature = one_episode(free, THETA + 0.1, noise(1, STEPS, deviation=0.0))
+    S = differences(lambda theta: evaluate(free, theta, STEPS).states, THETA + 0.1)
     wanted = 2 * np.einsum("itn,n,jtn->ij", S, free.task.weights, S)
     np.testing.assert_allclose(curvature, wanted, rtol=5e-3, atol=1e-5 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("place", [[0.3, 0.2, 0.4], [-8.9, 1.0, 0.0]])
 def test_the_feedback_of_the_policy_is_that_of_finite_differences(free, place):
-    state, h = np.array(place), 1e-5
-    plan = free.solve(state, THETA)
-    moved = [
-        (free.solve(state + e, THETA, plan).action - free.solve(state - e, THETA, plan).action)
-        / (2 * h)
-        for e in h * np.eye(3)
-    ]
-    np.testing.assert_allclose(
-        free.policy_feedback(plan), np.transpose(moved), rtol=1e-3, atol=1e-4
-    )
+    plan = free.solve(place, THETA)
+    slopes = differences(lambda s: free.solve(s, THETA, plan).action, np.array(place), 1e-5)
+    np.testing.assert_allclose(free.policy_feedback(plan), slopes.T, rtol=1e-3, atol=1e-4)
 
 
 def test_the_feedback_of_a_policy_in_other_units_is_in_the_users():
@@ -139,15 +117,13 @@ def test_the_feedback_of_a_policy_in_other_units_is_in_the_users():
 
 
 def test_an_episode_after_one_that_failed_or_was_left_is_as_it_is_alone(free, monkeypatch):
-    both = noise(0.02, episodes=2)
+    both, calls = noise(2, STEPS, deviation=0.02), iter(range(1000))
     alone = Exploration(both.noise[1:], both.scale[1:])
-    wanted = one_episode(free, THETA, alone)[1:]
-    optimiser, solve, calls = Recorder(), Nmpc.solve, 0
+    _, *wanted = one_episode(free, THETA, alone)
+    optimiser, solve = Recorder(), Nmpc.solve
 
     def failing(*given, **more):  # at the plan of t = 4; one solve a step
-        nonlocal calls
-        calls += 1
-        if calls == 5:
+        if next(calls) == 4:
             raise SolverError("broken", np.zeros(3), THETA)
         return solve(*given, **more)
 
@@ -155,25 +131,31 @@ def test_an_episode_after_one_that_failed_or_was_left_is_as_it_is_alone(free, mo
     learner = closed_loop(free, optimiser)
     steps = list(train(learner, free, Weights(THETA), both))
     assert [step.time for step in steps if step.failure] == [4]
-    for found, right in zip((optimiser.gradient, optimiser.curvature), wanted, strict=True):
-        np.testing.assert_array_equal(found, right)
+    np.testing.assert_array_equal(optimiser.gradient, wanted[0])
+    np.testing.assert_array_equal(optimiser.curvature, wanted[1])
     list(train(learner, free, steps[2].weights, alone))
     np.testing.assert_array_equal(optimiser.gradient, wanted[0])
 
 
-def test_gauss_newton_on_j_lowers_the_cost(free, tank):
-    learner = closed_loop(free, TrustRegion(0.3, np.ones(9)), (np.zeros(9), np.full(9, 10.0)))
-    *_, last = train(learner, free, Weights(THETA), noise(0.0, episodes=6))
-    assert evaluate(free, last.weights.theta, STEPS).cost < evaluate(free, THETA, STEPS).cost
-    learner = closed_loop(tank, TrustRegion(0.1, np.ones(2)), cost=charged)
-    silent = Exploration(np.zeros((8, STEPS, 1)), np.zeros((8, STEPS)))
-    *_, last = train(learner, tank, Weights(tank.problem.theta), silent, **TANK)
+@pytest.mark.parametrize(
+    ("name", "radius", "given", "world"),
+    [
+        ("free", 0.3, {"bounds": (np.zeros(9), np.full(9, 10.0))}, {}),
+        ("tank", 0.1, {"cost": charged}, TANK),
+    ],
+)
+def test_gauss_newton_on_j_lowers_the_cost_within_the_bounds(request, name, radius, given, world):
+    nmpc = request.getfixturevalue(name)
+    theta = THETA if nmpc.task else nmpc.problem.theta
+    learner = closed_loop(nmpc, TrustRegion(radius, np.ones(theta.size)), **given)
+    silent = noise(8, STEPS, nmpc.m, deviation=0.0)
+    *_, last = train(learner, nmpc, Weights(theta), silent, **world)
     before, after = (
-        evaluate(tank, theta, STEPS, **TANK).cost
-        for theta in (tank.problem.theta, last.weights.theta)
+        evaluate(nmpc, one, STEPS, **world).cost for one in (theta, last.weights.theta)
     )
     assert after < before
-    assert (last.weights.theta >= tank.problem.theta_lower).all()  # the bounds of the problem
+    least, most = given.get("bounds", (nmpc.problem.theta_lower, nmpc.problem.theta_upper))
+    assert ((least <= last.weights.theta) & (last.weights.theta <= most)).all()
 
 
 def test_gauss_newton_on_j_asks_for_the_cost_of_a_problems_environment(tank):

@@ -1,9 +1,11 @@
 """The deterministic policy gradient: its critic in closed form (LQR), and beside mpcrl's."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from learning.small_runs import differences
 from scipy.linalg import solve_discrete_lyapunov
 
 from nmpcrl.learning import Transition, Weights, policy_gradient
@@ -32,24 +34,21 @@ class Gain:
         return -solution.state[None]
 
 
-def cost(state, action):
-    return float(state @ Q @ state + action @ R @ action)
-
-
-def transition(state, exploration, *, last=False, end=False):
+def transition(state, exploration, **more):
     plan = -K @ state
     action = plan + exploration
     solution = SimpleNamespace(
         state=state, action=plan, value=0.0, ocp=SimpleNamespace(fixed_action=np.zeros(0))
     )
-    later = A @ state + B @ action
-    return Transition(state, action, cost(state, action), later, solution, end, last)
+    cost = float(state @ Q @ state + action @ R @ action)
+    return Transition(state, action, cost, A @ state + B @ action, solution, **more)
 
 
 def pairs(count=30):
     """Exploration of both signs in every state: what is even in it drops out of the critic."""
     states = np.random.default_rng(1).normal(size=(count, 2))
-    return [transition(s, sign * np.array([E])) for s in states for sign in (1, -1)]
+    steps = [transition(s, sign * np.array([E])) for s in states for sign in (1, -1)]
+    return [*steps[:-1], replace(steps[-1], last=True)]
 
 
 def means_of(transitions):
@@ -57,57 +56,41 @@ def means_of(transitions):
     return CriticMeans(*(np.mean(column, axis=0) for column in zip(*rows, strict=True)))
 
 
-@pytest.fixture(scope="module")
-def P():
-    """The value s'P s of -K s: P = Q + K'R K + gamma (A - B K)'P (A - B K)."""
-    closed = np.sqrt(GAMMA) * (A - B @ K)
-    return solve_discrete_lyapunov(closed.T, Q + K.T @ R @ K)
+def value(gain):
+    """The P with value s'P s of -K s: P = Q + K'R K + gamma (A - B K)'P (A - B K)."""
+    closed = np.sqrt(GAMMA) * (A - B @ gain)
+    return solve_discrete_lyapunov(closed.T, Q + gain.T @ R @ gain)
 
 
-@pytest.fixture(scope="module")
-def slope(P):
-    """dQ / da in a = -K s, as a matrix times s."""
-    return 2 * (GAMMA * B.T @ P @ (A - B @ K) - R @ K)
+P = value(K)
+SLOPE = 2 * (GAMMA * B.T @ P @ (A - B @ K) - R @ K)  # dQ / da in a = -K s, times s
 
 
-def test_the_critic_has_the_value_and_the_slope_of_the_action_value(P, slope):
+def test_the_critic_has_the_value_and_the_slope_of_the_action_value():
     means = means_of(pairs())
     v = lstd_value(means, 0.0)
     curvature = float((R + GAMMA * B.T @ P @ B).item())
     expected = [E**2 * curvature / (1 - GAMMA), 0, 0, P[0, 0], 2 * P[0, 1], P[1, 1]]
     np.testing.assert_allclose(v, expected, atol=1e-7)
-    np.testing.assert_allclose(lstd_advantage(means, v, 0.0), -slope.ravel(), atol=1e-7)  # psi -s e
+    np.testing.assert_allclose(lstd_advantage(means, v, 0.0), -SLOPE.ravel(), atol=1e-7)  # psi -s e
 
 
-def test_a_step_goes_down_the_mean_of_the_policys_slope_times_that_of_the_value(slope):
-    steps = pairs()
-    steps[-1] = transition(steps[-1].state, steps[-1].action - steps[-1].solution.action, last=True)
-    learner = policy_gradient(Gain(), 0.1, regularisation=0.0)
-    weights = Weights(K.ravel())
-    for step in steps:
+def test_a_step_goes_down_the_mean_of_the_policys_slope_times_that_of_the_value():
+    learner, weights = policy_gradient(Gain(), 0.1, regularisation=0.0), Weights(K.ravel())
+    for step in pairs():
         weights = learner.step(weights, step).weights
-    gradient = np.mean([-(slope @ t.state) * t.state for t in steps], axis=0)
+    gradient = np.mean([-(SLOPE @ t.state) * t.state for t in pairs()], axis=0)
     np.testing.assert_allclose(weights.theta, K.ravel() - 0.1 * gradient, atol=1e-7)
 
 
-def test_the_gradient_is_that_of_the_return(P):
+def test_the_gradient_is_that_of_the_return():
     """Against central differences of E[s'P s] in K, over starts weighted as they are visited."""
     starts = np.random.default_rng(2).normal(size=(40, 2))
-
-    def performance(gain):
-        closed = np.sqrt(GAMMA) * (A - B @ gain)
-        value = solve_discrete_lyapunov(closed.T, Q + gain.T @ R @ gain)
-        return np.mean([s @ value @ s for s in starts])
-
-    eps = 1e-6
-    steps = [np.array([[eps, 0.0]]), np.array([[0.0, eps]])]
-    numeric = [(performance(K + e) - performance(K - e)) / (2 * eps) for e in steps]
+    covariance = starts.T @ starts / len(starts)
+    numeric = differences(lambda gain: np.trace(value(gain[None]) @ covariance), K.ravel(), 1e-6)
     means = means_of(pairs())
     w = lstd_advantage(means, lstd_value(means, 0.0), 0.0)
-    visited, state, discount = np.zeros((2, 2)), starts.T, 1.0
-    for _ in range(400):
-        visited += discount * state @ state.T / len(starts)
-        state, discount = (A - B @ K) @ state, discount * GAMMA
+    visited = solve_discrete_lyapunov(np.sqrt(GAMMA) * (A - B @ K), covariance)
     np.testing.assert_allclose(policy_gradient_estimate(visited, w), numeric, rtol=1e-5)
 
 
