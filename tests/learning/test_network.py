@@ -195,3 +195,28 @@ def test_the_copy_of_a_target_follows_the_copy_of_its_network(again):
     assert not np.array_equal(target.predict(rows(9)[0]), before)
     assert target.fitted
     assert not learner.fitted
+
+
+def test_the_generator_of_mini_batches_is_splitmix64():
+    """The numbers for this seed at https://rosettacode.org/wiki/Pseudo-random_numbers/Splitmix64."""
+    draw = np.array([1234567], np.uint64)
+    uniform = machine_code().dense.uniform.py_func
+    with np.errstate(over="ignore"):
+        found = [uniform(draw) for _ in range(5)]
+    expected = [
+        6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431,
+        16408922859458223821,
+    ]  # fmt: skip
+    assert found == [number // 2**12 / 2**52 for number in expected]
+
+
+def test_a_mini_batch_holds_no_example_twice_and_each_as_often():
+    count, batch, fits = 20, 5, 4000
+    learner, drawn = taught(rows(count), batch=batch, hidden=1), np.zeros(count)
+    for _ in range(fits):
+        learner.fit()
+        order = learner.net[2][:count]
+        assert len(set(order)) == count
+        drawn[order[:batch]] += 1
+    share = batch / count
+    assert np.abs(drawn - fits * share).max() < 4 * np.sqrt(fits * share * (1 - share))

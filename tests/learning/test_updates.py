@@ -1,5 +1,7 @@
 """Every equation by hand."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ from nmpcrl.learning.updates import of_length
 THETA, W = np.array([1.0, -2.0]), np.array([0.5, 0.25])
 PHI, PHI_NEXT = np.array([2.0, 4.0]), np.array([1.0, -1.0])
 HESSIAN = np.array([[0.0, 2.0], [2.0, 3.0]])  # times w: (0.5, 1.75)
-GIVEN = THETA, W, 3.0, PHI, PHI_NEXT
+GRADIENT_TD = partial(gradient_td_step, THETA, W, 3.0, PHI, PHI_NEXT)
 
 
 @pytest.mark.parametrize(
@@ -24,10 +26,7 @@ GIVEN = THETA, W, 3.0, PHI, PHI_NEXT
     [
         (lambda: td_error(3.0, 0.5, q=10.0, q_next=8.0), -3.0),
         (lambda: semi_gradient_step(THETA, 3.0, PHI, 0.1), [1.0 + 0.6, -2.0 + 1.2]),
-        (
-            lambda: gradient_td_step(*GIVEN, alpha=0.1, gamma=0.5),
-            [1.0 + 0.1 * (6 - 1), -2.0 + 0.1 * (12 + 1)],
-        ),
+        (lambda: GRADIENT_TD(alpha=0.1, gamma=0.5), [1.0 + 0.1 * (6 - 1), -2.0 + 0.1 * (12 + 1)]),
         (lambda: auxiliary_step(W, 3.0, PHI, 0.1), [0.5 + 0.2, 0.25 + 0.4]),
         (lambda: curvature_correction(3.0, PHI, W, HESSIAN @ W), [0.5, 1.75]),
         (lambda: curvature_correction(5.0, PHI, W, HESSIAN @ W), [1.5, 5.25]),
