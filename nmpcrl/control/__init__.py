@@ -1,7 +1,7 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
 from nmpcrl.control.lookup import lookup
-from nmpcrl.control.nmpc import Nmpc, PlanJacobian
+from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
 from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError, Status
@@ -16,7 +16,6 @@ __all__ = [
     "Nmpc",
     "Obstacle",
     "Parameter",
-    "PlanJacobian",
     "Plant",
     "Problem",
     "Riccati",

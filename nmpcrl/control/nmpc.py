@@ -9,7 +9,7 @@ import time
 import warnings
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,18 +30,8 @@ from nmpcrl.control.variant import Variant
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
 
-
 DEFAULT = Riccati()
 HORIZON, GAMMA, SLACK_WEIGHT = 10, 0.97, 100.0
-
-__all__ = ["ABSURD", "Nmpc", "PlanJacobian"]
-
-
-class PlanJacobian(NamedTuple):
-    """How one stage of a plan answers to theta."""
-
-    states: Matrix  # d x_i / d theta, shape (n, d)
-    inputs: Matrix  # d u_i / d theta, shape (m, d); (0, d) at stage N
 
 
 class Nmpc(Described):
@@ -148,8 +138,10 @@ class Nmpc(Described):
         try:
             return variant.solve(state, theta, warm_start, *given, began=began, data=known)
         except SolverError as error:
-            why = variant.diagnosis.why(state, theta, known)
-            said = "; ".join(filter(None, (error.status, why, self._otherwise(why))))
+            why, other = variant.diagnosis.why(state, theta, known), ""
+            if self._solves.name != Riccati.name:  # which asked fatrop itself
+                other = f"try solver={Riccati.name!r}, which begins in more ways"
+            said = "; ".join(filter(None, (error.status, why, other)))
             if said == error.status:
                 raise
             raise type(error)(said, state, theta) from error
@@ -182,7 +174,7 @@ class Nmpc(Described):
         Raises:
             DerivativeError: a `SolverError`: the optimum moves in a direction without curvature.
         """
-        return self._variant(solution).inputs_jacobian(solution, 0)
+        return self._variant(solution).policy(solution)
 
     def policy_feedback(self, solution: Solution) -> Matrix:
         """du_0 / ds, shape (m, n): how the policy answers to the state; 0 where u_0 is given.
@@ -191,20 +183,6 @@ class Nmpc(Described):
             DerivativeError: as `policy_jacobian`.
         """
         return self._variant(solution).feedback(solution)
-
-    def plan_jacobian(self, solution: Solution, stage: int) -> PlanJacobian:
-        """The derivatives in theta of the plan's state and input of a stage, 0, ..., N.
-
-        Raises:
-            ValueError: there is no such stage.
-            DerivativeError: as `policy_jacobian`.
-        """
-        if not 0 <= stage <= self.horizon:
-            raise ValueError(f"stage = {stage} must lie among 0, ..., {self.horizon}")
-        variant = self._variant(solution)
-        return PlanJacobian(
-            variant.states_jacobian(solution, stage), variant.inputs_jacobian(solution, stage)
-        )
 
     def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.
@@ -226,18 +204,6 @@ class Nmpc(Described):
         """The nearest action within the bounds, shape (m,)."""
         return np.minimum(np.maximum(action, self.lower), self.upper)
 
-    def compile(self) -> None:
-        """Compile solver, derivatives, plant and cost now, and not where they are first used.
-
-        It takes half a minute, once on a machine, and says on standard error what it does; CasADi's
-        solvers take no time. `learning` compiles a loop of its own where a run begins.
-        """
-        if isinstance(self._free.solver, Compiled):
-            _ = self._free.solver.slopes
-        if self.plant is not None and self.task is not None:
-            still = self.clip(np.zeros(self.m))
-            self.task.stage_cost(self.plant.step(self.task.start, still), still)
-
     def machine(self, *, fix_action: bool) -> Compiled | None:
         """The compiled solver for V(s) or Q(s, a); None where none solves, or in its own units."""
         return (self._fixed if fix_action else self._free).machine
@@ -258,12 +224,6 @@ class Nmpc(Described):
             )
             self._solves = instead
         return self._solves.prepare(ocp)
-
-    def _otherwise(self, why: str) -> str:
-        """What else to try where a solve failed, for that reason."""
-        if self._solves.name == Riccati.name:  # which asked fatrop itself
-            return ""
-        return f"try solver={Riccati.name!r}, which begins in more ways"
 
     def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free

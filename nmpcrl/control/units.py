@@ -4,7 +4,6 @@ No solver is indifferent to units: with states of 1e-6 the errors that are allow
 """
 
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
@@ -14,47 +13,36 @@ from nmpcrl.control.solution import Solution
 
 
 class Units:
-    """The way from an OCP to the one that is solved, and back."""
+    """An OCP, and `ocp`, which is solved in its place: the same where all units are 1."""
 
     def __init__(self, ocp: Ocp) -> None:
-        self._outer, self._problem = ocp, ocp.problem
+        self._outer, self.ocp, solved = ocp, ocp, ocp.problem.solved
         self.states, self.inputs = ocp.problem.sizes
-        self.ocp = transcribe(
-            ocp.problem.solved, fix_action=ocp.fixed_action.size > 0, ties_active=ocp.ties_active
-        )
+        self.own = solved is ocp.problem
+        if not self.own:
+            fixed = ocp.fixed_action.size > 0
+            self.ocp = transcribe(solved, fix_action=fixed, ties_active=ocp.ties_active)
 
     def inside(self, solution: Solution) -> Solution:
-        """A solution as that of the OCP that is solved."""
-        own = solution.ocp is self._outer
-        sizes = self._sizes if own else self._sizes_in(solution.ocp)
+        """A solution in the units in which it was found."""
+        if self.own:
+            return solution
         return replace(
             solution,
             state=solution.state / self.states,
-            point=solution.point / sizes,
-            ocp=self.ocp if own else solution.ocp,
+            point=solution.point / self._sizes(solution.ocp),
+            ocp=self.ocp if solution.ocp is self._outer else solution.ocp,
         )
 
     def outside(self, found: Solution, state: Vector) -> Solution:
-        """A solution of the OCP that is solved as that of the problem."""
-        return replace(found, state=state, point=found.point * self._sizes, ocp=self._outer)
+        """A solution of `ocp` in the problem's units."""
+        point = found.point * self._sizes(self._outer)
+        return replace(found, state=state, point=point, ocp=self._outer)
 
-    @cached_property
-    def _sizes(self) -> Vector:
-        return self._sizes_in(self._outer)
-
-    def _sizes_in(self, ocp: Ocp) -> Vector:
-        return sizes_in(ocp, self.states, self.inputs)
-
-
-def sizes_in(ocp: Ocp, states: Vector, inputs: Vector) -> Vector:
-    """The units of z, lam and nu, each in the order of an OCP."""
-    z, lam = np.ones(ocp.lower.size), np.ones(ocp.equality.size)
-    z[ocp.states], z[ocp.inputs] = states, inputs
-    lam[ocp.initial], lam[ocp.dynamics] = 1 / states, 1 / states
-    lam[ocp.fixed_action] = 1 / inputs[: ocp.fixed_action.size]
-    return np.concatenate([z, lam, 1 / z])
-
-
-def units_of(ocp: Ocp) -> Units | None:
-    """None where a problem is solved in its own units."""
-    return None if ocp.problem.solved is ocp.problem else Units(ocp)
+    def _sizes(self, ocp: Ocp) -> Vector:
+        """The units of z, lam and nu, each in the order of an OCP."""
+        z, lam = np.ones(ocp.lower.size), np.ones(ocp.equality.size)
+        z[ocp.states], z[ocp.inputs] = self.states, self.inputs
+        lam[ocp.initial], lam[ocp.dynamics] = 1 / self.states, 1 / self.states
+        lam[ocp.fixed_action] = 1 / self.inputs[: ocp.fixed_action.size]
+        return np.concatenate([z, lam, 1 / z])

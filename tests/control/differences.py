@@ -65,11 +65,6 @@ def agrees(
     for found in (dense, products):
         near(found, lambda one: one.features)
         np.testing.assert_allclose(found, np.transpose(found), atol=tolerance * np.abs(dense).max())
-    unit_x, unit_u = nmpc.problem.sizes
-    near(nmpc.policy_jacobian(solution) / unit_u[:, None], lambda one: one.action / unit_u, 1.0)
-    for stage in {0, 1, nmpc.horizon // 2, nmpc.horizon}:
-        plan = nmpc.plan_jacobian(solution, stage)
-        near(plan.states / unit_x[:, None], lambda one, i=stage: one.states[i] / unit_x, 1.0)
-        if stage < nmpc.horizon:
-            near(plan.inputs / unit_u[:, None], lambda one, i=stage: one.inputs[i] / unit_u, 1.0)
+    unit = nmpc.problem.sizes[1]
+    near(nmpc.policy_jacobian(solution) / unit[:, None], lambda one: one.action / unit, 1.0)
     return True

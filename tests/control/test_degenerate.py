@@ -77,7 +77,6 @@ def test_at_a_kink_derivatives_are_those_of_the_side_where_theta_grows(name, sol
     for slope, (below, above) in zip(one.features, case.slopes, strict=False):
         assert below - 1e-3 <= slope <= above + 1e-3
     np.testing.assert_allclose(nmpc.policy_jacobian(one)[:, :used], case.policy, atol=1e-5)
-    np.testing.assert_allclose(nmpc.plan_jacobian(one, 1).states[:, :used], case.policy, atol=1e-5)
     np.testing.assert_allclose(nmpc.value_hessian(one)[:used, :used], case.hessian, atol=1e-4)
     for k in range(used):
         found = nmpc.value_hessian_times(one, np.eye(3)[k])[:used]
@@ -90,7 +89,7 @@ def test_without_a_derivative_the_error_is_that_of_a_solve(solver):
     pulled = {"q": [0, 2], "P": [[1, 0], [0, 0], [0, 0]]}
     nmpc, one = solved(Case([0], [], [], [], [], pulled), solver)
     for ask in (
-        nmpc.value_hessian, nmpc.policy_jacobian, lambda at: nmpc.plan_jacobian(at, 0),
+        nmpc.value_hessian, nmpc.policy_jacobian,
         lambda at: nmpc.value_hessian_times(at, np.ones(3)),
     ):  # fmt: skip
         with pytest.raises(SolverError, match="no curvature"):

@@ -107,8 +107,6 @@ def test_a_solve_that_is_none():
         nmpc.solve(np.array([np.inf, 0]), theta)
     with pytest.raises(ValueError, match=r"data has no 'wind' .it has none"):
         nmpc.solve(np.zeros(2), theta, data={"wind": 1.0})
-    with pytest.raises(ValueError, match=r"stage = 4 must lie among 0, \.\.\., 3"):
-        nmpc.plan_jacobian(nmpc.solve(np.zeros(2), theta), 4)
     assert nmpc.solve(np.array([3000.0, -2e5]), theta).value > 0  # no unit is forbidden
 
 

@@ -252,15 +252,6 @@ class Program:
         }
         return ca.nlpsol(solver.name, solver.name, nlp, settings | solver.structure(ocp))
 
-    def hessian_times(self, solution: Solution, vector: Vector) -> None:
-        """None: CasADi's solvers have the dense Hessian only."""
-
-    def feedback(self, solution: Solution) -> None:
-        """None, as well."""
-
-    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> None:
-        """None, as well."""
-
     def _standing(self, state: Vector, seed: int = 0, *, share: float = OFF_REST) -> PrimalDual:
         """Stay at `state` for the whole horizon; slacks take up what overlaps there.
 

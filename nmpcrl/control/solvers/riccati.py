@@ -212,32 +212,38 @@ class Compiled:
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
-        return self._slopes(solution, vector, *self._no_weights)
+        return self._slopes(solution, vector, np.zeros(self._ocp.inputs.shape))
 
-    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
-        """The gradient in theta of a weighted sum of the plan; None likewise."""
-        return self._slopes(solution, np.zeros(solution.theta.size), states, inputs)
+    def policy(self, solution: Solution) -> Matrix | None:
+        """du_0 / dtheta, shape (m, d), a sweep an input; None likewise."""
+        still, weights = (
+            np.zeros(solution.theta.size),
+            np.zeros((self._problem.inputs, *self._ocp.inputs.shape)),
+        )
+        weights[:, 0] = np.eye(self._problem.inputs)
+        found = [self._slopes(solution, still, one) for one in weights]
+        return None if found[0] is None else np.array(found)
 
     def feedback(self, solution: Solution) -> Matrix | None:
         """du_0 / ds, shape (m, n), the gain of stage 0; None likewise."""
         d, (n, m) = solution.theta.size, (self._problem.states, self._problem.inputs)
         if self._fixed:
             return np.zeros((m, n))
-        found = self._slopes(solution, np.zeros(d), *self._no_weights, more=n * m)
+        still, inputs = np.zeros(d), np.zeros(self._ocp.inputs.shape)
+        found = self._slopes(solution, still, inputs, more=n * m)
         return None if found is None else found[d:].reshape(m, n)
 
-    @cached_property
-    def _no_weights(self) -> tuple[Matrix, Matrix]:
-        return np.zeros(self._ocp.states.shape), np.zeros(self._ocp.inputs.shape)
-
-    def _slopes(self, solution: Solution, *directions: Matrix, more: int = 0) -> Vector | None:
+    def _slopes(
+        self, solution: Solution, along: Vector, inputs: Matrix, *, more: int = 0
+    ) -> Vector | None:
+        """`slopes.slopes` along a direction of theta, of a sum of inputs with these weights."""
         if solution.took_over:  # whose states are not rolled out
             return None
         action = solution.action if self._fixed else self._no_action
         data = self.arguments.data if solution.data is None else solution.data
         given = (solution.state, solution.theta, action, self._fixed, solution.point)
-        out = np.empty(solution.theta.size + more)
-        formed = self.slopes(data, *self.arguments[1:], *given, *directions, out)
+        states, out = np.zeros(self._ocp.states.shape), np.empty(solution.theta.size + more)
+        formed = self.slopes(data, *self._rest, *given, along, states, inputs, out)
         return out if formed else None
 
     @cached_property

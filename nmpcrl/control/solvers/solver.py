@@ -29,15 +29,6 @@ class Prepared(Protocol):
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
 
-    def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
-        """The Hessian of the value in theta, times a vector (d,); None if it cannot be had fast."""
-
-    def feedback(self, solution: Solution) -> Matrix | None:
-        """du_0 / ds of a free u_0, shape (m, n); None if it cannot be had fast."""
-
-    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
-        """The gradient in theta of the plan's sum with these weights, (N + 1, n) and (N, m)."""
-
 
 @dataclass(frozen=True)
 class Solver(ABC):

@@ -18,7 +18,7 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.solvers.codes import End
 from nmpcrl.control.solvers.riccati import Compiled, Riccati, machine_code
-from nmpcrl.control.units import units_of
+from nmpcrl.control.units import Units
 
 
 def interpreted(of: Problem) -> ModuleType:
@@ -65,10 +65,9 @@ def trace(
         (barrier parameter), value (of the plan, slacks included), delta (what every Q_uu got on top
         in the step from here; nan in the last row).
     """
-    units = units_of(ocp)
-    if units is not None:
-        ocp, state = units.ocp, state / units.states
-        warm_start = None if warm_start is None else units.inside(warm_start)
+    units = Units(ocp)
+    ocp, state = units.ocp, state / units.states
+    warm_start = None if warm_start is None else units.inside(warm_start)
     plain = interpreted(ocp.problem)
     known = ocp.problem.data if data is None else data
     rows: list[dict[str, float]] = []
