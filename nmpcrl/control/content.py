@@ -6,9 +6,11 @@ its version.
 """
 
 import dis
+import hashlib
 import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
 from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
@@ -25,6 +27,53 @@ OWN = "nmpcrl"  # whose code the epochs of `provenance` stand for
 
 class NoContent(ValueError):
     """Of this value no name can be made; the message says what it is."""
+
+
+class Described:
+    """Something that is pickled, copied and named by its fields, without `cached_property` ones."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        kind = type(self)
+        return {
+            name: value
+            for name, value in vars(self).items()
+            if not isinstance(getattr(kind, name, None), cached_property)
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """The fields; an array is as unchangeable as it was made."""
+        for value in state.values():
+            for one in value if isinstance(value, tuple) else (value,):
+                if isinstance(one, np.ndarray):
+                    one.setflags(write=False)
+        vars(self).update(state)
+
+    @property
+    def key(self) -> str:
+        """A hash of all that it does, the same in every process and on every machine.
+
+        Of a class of the user's, or an object with a method of its own, that is the code, too, with
+        all that it reads of its module.
+
+        Raises:
+            NoContent: such a class or object holds what may be different each time.
+        """
+        return key_of(type(self), self.__getstate__())
+
+
+@dataclass(frozen=True)
+class TracedFunction:
+    """A function of the user as its CasADi expression, so that it can be pickled."""
+
+    function: ca.Function
+
+    def __call__(self, *arguments: ca.SX) -> Any:
+        return self.function(*arguments)
+
+
+def key_of(*values: Any) -> str:
+    """A hash of the content of values, in hexadecimal."""
+    return hashlib.sha256(repr(content(values)).encode()).hexdigest()
 
 
 def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
@@ -46,7 +95,7 @@ def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
         parts = [content(one, inside) for one in value]
         return parts if isinstance(value, tuple | list) else sorted(map(str, parts))
     if isinstance(value, ca.Function):
-        return instructions(value)
+        return value.serialize()
     if isinstance(value, AROUND):
         return [content(getattr(value, name, None), inside) for name in WITHIN]
     if isinstance(value, partial):
@@ -118,11 +167,6 @@ def _reads(code: CodeType) -> Iterator[str]:
             yield from _reads(one)
 
 
-def is_ours(kind: type) -> bool:
-    """Whether a class is part of this library."""
-    return kind.__module__.partition(".")[0] == OWN
-
-
 @cache
 def _is_library(module: str) -> bool:
     """Whether a module is Python's, an installed one or ours, and not the user's."""
@@ -138,24 +182,6 @@ def _is_library(module: str) -> bool:
 @cache
 def _version(library: str) -> str:
     try:
-        return version(library)
+        return version(library) if library != OWN else ""
     except PackageNotFoundError:
         return ""
-
-
-def instructions(function: ca.Function) -> str:
-    """What an SX function does, a line a step; all that CasADi knows where it calls others."""
-    if ca.OP_CALL in map(function.instruction_id, range(function.n_instructions())):
-        text: str = function.serialize()
-        return text
-    steps = [
-        (
-            function.instruction_id(k),
-            function.instruction_input(k),
-            function.instruction_output(k),
-            function.instruction_constant(k),
-        )
-        for k in range(function.n_instructions())
-    ]
-    sizes = [function.size_in(k) for k in range(function.n_in())]
-    return "\n".join(map(str, (sizes, *steps)))

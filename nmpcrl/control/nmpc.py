@@ -16,7 +16,7 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.description import Described
+from nmpcrl.control.content import Described, key_of
 from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
@@ -191,14 +191,11 @@ class Nmpc(Described):
         """
         return self._variant(solution).kkt_residual(solution, relative=relative)
 
-    def _described(self) -> tuple[Any, ...]:
-        """Without numba, riccati's key is that of fatrop, which then solves."""
+    @property
+    def key(self) -> str:
+        """As of a `Problem`. Without numba, riccati's is that of fatrop, which then solves."""
         solver = self.solver if self.solver.available else Fatrop(self.solver.tolerance)
-        how = (solver.name, solver.tolerance, self.ties_active, *solver.described)
-        if self.task is None:
-            return "nmpc", self.problem.key, *how
-        said = (self.horizon, self.gamma, self.slack_weight)
-        return "nmpc", self.plant.key, self.task.key, *said, *how
+        return key_of(type(self), self.__getstate__() | {"solver": solver})
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

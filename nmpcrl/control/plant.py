@@ -10,7 +10,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.description import Described, TracedFunction
+from nmpcrl.control.content import Described, TracedFunction
 from nmpcrl.control.expression import column, expression
 from nmpcrl.control.vectors import positive_integer, read_only
 
@@ -74,10 +74,6 @@ class Plant(Described):
     def __getstate__(self) -> dict[str, Any]:
         """The fields, with the dynamics as an expression: a function need not have a name."""
         return super().__getstate__() | {"dynamics": TracedFunction(self._derivative)}
-
-    def _described(self) -> tuple[Any, ...]:
-        fields = (self.state_names, self.action_names, self.lower, self.upper)
-        return "plant", self._derivative, *fields, self.period, self.substeps
 
     @property
     def n(self) -> int:

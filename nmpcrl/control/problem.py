@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.blocks import Blocks, Symbols, numbers
-from nmpcrl.control.description import Described
+from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import positive_integer, read_only
 
@@ -233,14 +233,6 @@ class Problem(Described):
     def _every(self, fixed: Any, each: Any) -> NDArray[Any]:
         """Values of all rows, of values of the fixed ones and of those of a line."""
         return np.concatenate([fixed, np.tile(each, self.lines)])
-
-    def _described(self) -> tuple[Any, ...]:
-        return (
-            "problem", self._function, self.horizon, self.gamma, self.lower, self.upper,
-            self.state_lower, self.state_upper,
-            self.names, self.theta, self.theta_lower, self.theta_upper,
-            self.weights, self.active, self.data_names, self.data, self.sizes,
-        )  # fmt: skip
 
     @cached_property
     def cost_scale(self) -> float:

@@ -1,7 +1,7 @@
 """The task: where to go, what to avoid, and the cost that reinforcement learning minimises."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.description import Described
+from nmpcrl.control.content import Described
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, Soft
 from nmpcrl.control.vectors import read_only
@@ -102,11 +102,6 @@ class Task(Described):
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if self.obstacles and self.start.size < 2:
             raise ValueError("obstacles stand in a plane: a task with one state has none")
-
-    def _described(self) -> tuple[Any, ...]:
-        discs = tuple((one.x, one.y, one.diameter) for one in self.obstacles)
-        named = {one.name: getattr(self, one.name) for one in fields(Task)}
-        return "task", {**named, "obstacles": discs}
 
     def _refuse_outside(self, name: str) -> None:
         point = getattr(self, name)

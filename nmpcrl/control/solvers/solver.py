@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.content import content, is_ours
 from nmpcrl.control.diagnosis import SUBSTEPS
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import Solution
@@ -48,13 +47,6 @@ class Solver(ABC):
     def available(self) -> bool:
         """Whether what it needs is installed."""
         return True
-
-    @property
-    def described(self) -> tuple[str, ...]:
-        """The fields besides the tolerance that are not the default, for a key."""
-        kind, fields = type(self), {n: v for n, v in vars(self).items() if n != "tolerance"}
-        changed = {n: v for n, v in fields.items() if v is not getattr(kind, n, fields)}
-        return (repr(content([kind, changed])),) if changed or not is_ours(kind) else ()
 
     @abstractmethod
     def prepare(self, ocp: Ocp) -> Prepared:
