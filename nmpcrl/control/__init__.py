@@ -1,6 +1,5 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
-from nmpcrl.control.lookup import lookup
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
 from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
@@ -26,7 +25,6 @@ __all__ = [
     "Status",
     "Task",
     "differential_drive",
-    "lookup",
     "rk4",
     "unicycle",
 ]

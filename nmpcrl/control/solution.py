@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -87,11 +86,6 @@ class Solution:
         action = self.action[: self.ocp.fixed_action.size]
         data = self.ocp.problem.data if self.data is None else self.data
         return np.concatenate([self.state, self.theta, action, data.ravel()])
-
-    @property
-    def features_by_name(self) -> dict[str, Any]:
-        """The gradient in each parameter, in its shape."""
-        return self.ocp.problem.split(self.features)
 
     @property
     def primal(self) -> Vector:

@@ -24,7 +24,7 @@ def solvers(problem) -> dict[str, Nmpc]:
 
 def test_the_gradient_has_names(problem, solvers):
     solution = solvers["riccati"].solve(np.array([0.4, 0.1]), problem.theta)
-    by_name = solution.features_by_name
+    by_name = problem.split(solution.features)
     assert by_name["Q"].shape == (2, 2)
     assert isinstance(by_name["rate"], float)
     flat = np.concatenate([np.ravel(by_name[name]) for name in problem.names])

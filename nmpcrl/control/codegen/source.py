@@ -160,8 +160,8 @@ def _line(function: ca.Function, k: int, returned: bool, way: _Way) -> str:
     template = UNARY.get(operation) or BINARY.get(operation)
     if operation == ca.OP_CALL:
         raise CannotCompile(
-            f"{function.name()} calls a function that is not written in SX; for a table, as of"
-            " ca.interpolant, write lookup(points, values, x)"
+            f"{function.name()} calls a function that is not written in SX; for a table of"
+            " ca.interpolant, write ca.pw_lin(x, points, values)"
         )
     if template is None:
         raise CannotCompile(
