@@ -31,8 +31,7 @@ class Bending:
         """
         of, fell = self._problem, theta < self.least
         self.least = np.where(fell, 2 * theta, self.least)
-        still = np.clip(np.zeros(of.inputs), of.lower, of.upper)
-        now, before = (self._bends(state, still, one, of.own(data[0]))
+        now, before = (self._bends(state, of.still, one, of.own(data[0]))
                        for one in (theta, np.where(fell, -theta, theta)))  # fmt: skip
         for pair in zip(now, before, strict=True):
             bends = np.array([bend.full() for bend in pair])

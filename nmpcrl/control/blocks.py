@@ -1,7 +1,7 @@
 """Named arrays that share one vector."""
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import casadi as ca
@@ -21,7 +21,9 @@ class Blocks(Mapping[str, tuple[int, ...]]):
         self._places = dict(zip(self._shapes, map(slice, ends[:-1], ends[1:]), strict=True))
 
     def __getitem__(self, name: str) -> tuple[int, ...]:
-        return self._shapes[self.known(name)]
+        if name not in self._shapes:
+            raise unknown(self._what, name, self._shapes)
+        return self._shapes[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._shapes)
@@ -29,23 +31,9 @@ class Blocks(Mapping[str, tuple[int, ...]]):
     def __len__(self) -> int:
         return len(self._shapes)
 
-    def known(self, name: str) -> str:
-        """The name, if it is one.
-
-        Raises:
-            ValueError: it is none; with the nearest.
-        """
-        if name in self._shapes:
-            return name
-        near = difflib.get_close_matches(str(name), self._shapes, 1)
-        meant = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(
-            f"{self._what} has no {name!r}{meant} (it has {', '.join(self._shapes) or 'none'})"
-        )
-
     def part(self, name: str, vector: Any) -> Any:
         """The entries of one name in a vector, or in the last axis of an array."""
-        return vector[..., self._places[self.known(name)]]
+        return vector[..., self._places[name]]
 
     def split(self, vector: Vector) -> dict[str, Any]:
         """Every array by its name; a float where it is a single number."""
@@ -53,8 +41,12 @@ class Blocks(Mapping[str, tuple[int, ...]]):
         return {name: a if a.shape else float(a) for name, a in arrays.items()}
 
     def symbols(self, vector: ca.SX) -> "Symbols":
-        """The same of a vector of symbols, as a model reads them."""
-        return Symbols(self, vector)
+        """The arrays in a vector of symbols."""
+        found = Symbols(self._what)
+        for name, shape in self.items():
+            part = vector[self._places[name]]
+            found[name] = ca.reshape(part, *shape[::-1]).T if len(shape) == 2 else part
+        return found
 
     def filled(self, base: Matrix, values: Mapping[str, Any]) -> Matrix:
         """A copy of `base`, vectors along its last axis, with these arrays in their places.
@@ -76,28 +68,22 @@ class Blocks(Mapping[str, tuple[int, ...]]):
         return copy
 
 
-class Symbols(Mapping[str, ca.SX]):
-    """Symbols by name, in their shapes."""
+class Symbols(dict[str, ca.SX]):
+    """Symbols by name, in their shapes, as a model reads them."""
 
-    def __init__(self, blocks: Blocks, vector: ca.SX) -> None:
-        self._blocks, self._vector = blocks, vector
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self._what = what
 
-    @staticmethod
-    def joined(one: "Symbols", other: "Symbols") -> "Symbols":
-        """The names of both."""
-        shapes = {**one._blocks, **other._blocks}
-        return Symbols(Blocks(one._blocks._what, shapes), ca.vertcat(one._vector, other._vector))
+    def __missing__(self, name: str) -> ca.SX:
+        raise unknown(self._what, name, self)
 
-    def __getitem__(self, name: str) -> ca.SX:
-        shape = self._blocks[name]
-        part = self._vector[self._blocks._places[name]]
-        return ca.reshape(part, *shape[::-1]).T if len(shape) == 2 else part
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._blocks)
-
-    def __len__(self) -> int:
-        return len(self._blocks)
+def unknown(what: str, name: str, known: Iterable[str]) -> ValueError:
+    """What is said of a name that there is not, with the nearest that there is."""
+    near = difflib.get_close_matches(str(name), known, 1)
+    meant = f"; did you mean {near[0]!r}?" if near else ""
+    return ValueError(f"{what} has no {name!r}{meant} (it has {', '.join(known) or 'none'})")
 
 
 def numbers(name: str, value: Any, *, empty: bool = False) -> Matrix:

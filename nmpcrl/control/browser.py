@@ -131,7 +131,7 @@ def problem(
         "soft": int(of.soft[:fixed].sum()),
         "fixed": fixed,
         "per": e.each.numel(),
-        "own": of.own_size,
+        "own": of.own_names.size,
         "width": e.line.numel(),
         "tolerance": solver.tolerance,
     }

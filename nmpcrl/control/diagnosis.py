@@ -40,12 +40,11 @@ class Diagnosis:
         z, data = ca.vertcat(e.x, e.u), ca.SX.sym("d", of.data_names.size)
         given = [e.x, e.u, e.theta, data]
         costs = [e.next_x, e.stage, e.terminal, e.initial]
-        model, stage, terminal, initial = ca.substitute(costs, [e.d], [data[: of.own_size]])
+        model, stage, terminal, initial = ca.substitute(costs, [e.d], [data[: of.own_names.size]])
         rows = of.rows(*given)
         parts = {"model": model, "stage": stage, "rows": rows, "initial": initial}
         sharp = {"model": model, "stage": stage, "terminal": terminal, "rows": rows}
         self._kinks = {name: kinks_in(written, z) for name, written in sharp.items()}
-        self._still = np.clip(np.zeros(of.lower.size), of.lower, of.upper)
         self._orders: dict[str, dict[str, Callable[..., Any]]] = {order: {} for order in ORDERS}
         for name, written in parts.items():
             slope = ca.jacobian(written, z)
@@ -57,10 +56,10 @@ class Diagnosis:
         """What is wrong on the way that no input leads to, in one sentence; "" if nothing is."""
         N = len(self._ocp.inputs)
         for i in range(N):
-            given = state, self._still, theta, data[i]
+            given = state, self._ocp.problem.still, theta, data[i]
             said = self._not_finite(*given) or self._too_fast(i + 1, *given)
             if said:
-                return said.format(f"at x = {short(state)}, u = {short(self._still)}")
+                return said.format(f"at x = {short(state)}, u = {short(self._ocp.problem.still)}")
             state = self._orders[""]["model"](*given).full().ravel()
         for name, kinks in self._kinks.items():
             if kinks:

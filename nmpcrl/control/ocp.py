@@ -133,9 +133,9 @@ def transcribe(problem: Problem, *, fix_action: bool, ties_active: bool = False)
     start = ca.Function("start", [e.x, e.theta, e.d], [e.initial])
     final = ca.Function("final", [e.x, e.theta, e.d], [e.terminal])
     variables, constraints = _Stack(), _Stack()
-    objective = start(state, theta, data[: problem.own_size, 0])
+    objective = start(state, theta, data[: problem.own_names.size, 0])
     for i in range(N + 1):
-        d, own = data[:, i], data[: problem.own_size, i]
+        d, own = data[:, i], data[: problem.own_names.size, i]
         last, free = i == N, fix_action and i == 0
         box = (problem.state_lower, problem.state_upper) if i > 0 else (-np.inf, np.inf)
         variables.add("states", x[i], *box)

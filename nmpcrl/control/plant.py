@@ -12,7 +12,7 @@ from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.content import Described, TracedFunction
 from nmpcrl.control.expression import column, expression
-from nmpcrl.control.vectors import positive_integer, read_only
+from nmpcrl.control.vectors import box, positive_integer
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 
@@ -55,15 +55,11 @@ class Plant(Described):
     substeps: int = 1  # Runge-Kutta steps a period: more where the dynamics are faster than it
 
     def __post_init__(self) -> None:
-        for side in ("lower", "upper"):
-            bound = read_only(getattr(self, side))
-            if bound.shape != (self.m,) or np.isnan(bound).any():
-                raise ValueError(f"plant.{side} = {bound} must hold {self.m} numbers, one an input")
-            object.__setattr__(self, side, bound)
+        lower, upper = box("plant.", self.lower, self.upper, self.m, "an input")
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
         if not self.n:
             raise ValueError("a plant needs a state: state_names is empty")
-        if not (self.lower < self.upper).all():
-            raise ValueError(f"plant.lower = {self.lower} must lie below upper = {self.upper}")
         if not 0 < self.period < np.inf:
             raise ValueError(f"plant.period = {self.period} must be a positive number of seconds")
         positive_integer("plant.substeps", self.substeps)

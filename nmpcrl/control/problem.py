@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.blocks import Blocks, Symbols, numbers
+from nmpcrl.control.blocks import Blocks, numbers
 from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
-from nmpcrl.control.vectors import positive_integer, read_only
+from nmpcrl.control.vectors import box, positive_integer, read_only, spread
 
 SMALL, LARGE = 1e-2, 1e4  # sizes of states that every solver takes as they are
 LEAST = 1e-200  # curvature, or slope
@@ -77,12 +77,12 @@ class Expressions(NamedTuple):
     u: ca.SX
     theta: ca.SX
     d: ca.SX  # of one stage
+    line: ca.SX  # of data, as of `Soft.each`
     next_x: ca.SX
     stage: ca.SX
     terminal: ca.SX
     initial: ca.SX
     fixed: ca.SX  # h and then g, but for the rows of lines of data
-    line: ca.SX  # of data, as of `Soft.each`
     each: ca.SX  # the rows of a line
 
 
@@ -145,63 +145,114 @@ class Problem(Described):
         Raises:
             ValueError: something is no such thing; the message names it and says what to write.
         """
-        self.states, self.inputs, self.horizon = (
-            positive_integer(name, number)
-            for name, number in (("states", states), ("inputs", inputs), ("horizon", horizon))
+        self.states = positive_integer("states", states)
+        self.inputs = positive_integer("inputs", inputs)
+        self.horizon = positive_integer("horizon", horizon)
+        if not 0 < gamma <= 1:
+            raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
+        self.gamma = float(gamma)
+        self.lower, self.upper = box("", lower, upper, self.inputs, "an input")
+        self.state_lower, self.state_upper = box(
+            "state_", state_lower, state_upper, self.states, "a state"
         )
-        self.gamma = discount(gamma)
-        self.lower, self.upper = _bounds("", lower, upper, self.inputs)
-        self.state_lower, self.state_upper = _bounds(
-            "state_", state_lower, state_upper, self.states
-        )
-        parameters = {
-            name: one if isinstance(one, Parameter) else Parameter(one)
-            for name, one in theta.items()
-        }
-        starts = {name: numbers(f"theta {name}", one.start) for name, one in parameters.items()}
+        self._take_theta(theta)
+        rows = {**_rows("soft", soft, Soft), **_rows("hard", hard, Hard)}
+        family = _family(rows, data or {})
+        self._take_data(data or {}, family)
+        self._write(model, stage, terminal, initial, rows, family)
+        self.sizes = _sizes(scale, self)
+
+    def _take_theta(self, theta: Mapping[str, Any]) -> None:
+        """Names, starts and bounds of the parameters."""
+        starts, lower, upper = {}, [], []
+        for name, one in theta.items():
+            given = one if isinstance(one, Parameter) else Parameter(one)
+            starts[name] = start = numbers(f"theta {name}", given.start)
+            low, high = (
+                spread(f"theta {name}.{side}", getattr(given, side), start.shape, "an entry")
+                for side in ("lower", "upper")
+            )
+            if not ((low <= start) & (start <= high)).all():
+                raise ValueError(f"theta {name!r} starts at {start}, outside {low} and {high}")
+            lower.append(low.ravel())
+            upper.append(high.ravel())
         self.names = Blocks("theta", {name: start.shape for name, start in starts.items()})
         if not self.names.size:
             raise ValueError("theta is empty: name at least one parameter, or nothing is learned")
         self.theta = read_only(self.names.filled(np.zeros(self.names.size), starts))
-        self.theta_lower, self.theta_upper = (
-            read_only(np.concatenate([_spread(name, getattr(parameters[name], side), starts[name])
-                                 for name in parameters]))
-            for side in ("lower", "upper")
-        )  # fmt: skip
-        self._refuse_outside()
-        rows = {**_rows("soft", soft, Soft), **_rows("hard", hard, Hard)}
-        self.family = _family(rows, data or {})
-        defaults = {
-            name: numbers(f"data {name}", one.values if isinstance(one, Series) else one,
-                          empty=name == self.family)
-            for name, one in (data or {}).items()
-        }  # fmt: skip
-        shapes = {
-            name: one.shape[isinstance((data or {})[name], Series) :]
-            for name, one in sorted(defaults.items(), key=lambda one: one[0] == self.family)
-        }
-        if self.family and len(shapes[self.family]) != 2:
-            raise ValueError(f"data {self.family!r} must be a table: its rows are of each line")
-        self.lines, width = shapes.pop(self.family, (0, 0)) if self.family else (0, 0)
+        self.theta_lower, self.theta_upper = map(read_only, map(np.concatenate, (lower, upper)))
+
+    def _take_data(self, data: Mapping[str, Any], family: str | None) -> None:
+        """Names and defaults of the data of a stage; the table `family` comes last."""
+        arrays, shapes = {}, {}
+        for name, one in sorted(data.items(), key=lambda item: item[0] == family):
+            values = one.values if isinstance(one, Series) else one
+            arrays[name] = numbers(f"data {name}", values, empty=name == family)
+            shapes[name] = arrays[name].shape[isinstance(one, Series) :]
+        if family and len(shapes[family]) != 2:
+            raise ValueError(f"data {family!r} must be a table: its rows are of each line")
+        self.data_names = Blocks("data", shapes)
+        self.lines, self.width = shapes.pop(family, (0, 0)) if family else (0, 0)
         self.own_names = Blocks("data", shapes)
-        self.line_names = Blocks("line", {self.family: (width,)} if self.family else {})
-        table = {self.family: (self.lines, width)} if self.family else {}
-        self.data_names = Blocks("data", shapes | table)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
-        self.data = read_only(self.data_names.filled(empty, defaults))
-        self._function, sizes = self._written(model, stage, terminal, initial, rows)
-        self.weights, self.active = self._spread(rows, sizes)
-        e = self.expressions
-        self.on_inputs = self._every(*(_depends(rows, e.u) for rows in (e.fixed, e.each)))
-        self.sizes = _sizes(scale, self)
+        self.data = read_only(self.data_names.filled(empty, arrays))
+
+    def _write(
+        self,
+        model: Callable[..., Any],
+        stage: Callable[..., Any],
+        terminal: Callable[..., Any] | None,
+        initial: Callable[..., Any] | None,
+        rows: Rows,
+        family: str | None,
+    ) -> None:
+        """The problem as a function that can be pickled; weights and stages of its rows."""
+        x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
+        theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.own_names.size)
+        line = ca.SX.sym("line", self.width)
+        th, known = self.names.symbols(theta), self.own_names.symbols(d)
+        in_line = copy(known)
+        if family:
+            in_line[family] = line
+        last = (th, known) if self.own_names else (th,)
+        arguments = {"x": x, "u": u, "theta": theta, "d": d}
+        both, alone = ((x, u, *last), arguments), ((x, *last), {**arguments, "u": None})
+        of_line = ((x, u, th, in_line), {**arguments, "line": line})
+        next_x = expression("model", model, *both, self.states, "state")
+        cost = expression("stage", stage, *both, 1, "cost")
+        final = expression("terminal", terminal, *alone, 1, "cost")
+        first = expression("initial", initial, *alone, 1, "cost")
+        none = ca.SX(0, 1), np.zeros(0), np.zeros((self.horizon + 1, 0), bool), np.zeros(0, bool)
+        fixed, each = [none], [none]  # rows, their W, whether they hold at each stage, and on u
+        for name, one in rows.items():
+            row = expression(name, one.row, *(of_line if one.each else both), 0, "row")
+            if not _depends(row, ca.vertcat(x, u)).all():
+                raise ValueError(
+                    f"{name} has a row that depends on neither x nor u: no plan can change it"
+                )
+            size, on_inputs = row.numel(), _depends(row, u)
+            held = _stages(name, one.stages, self.horizon, on_inputs=bool(on_inputs.any()))
+            weight: Vector = np.full(size, np.inf)
+            if isinstance(one, Soft):
+                weight = spread(f"{name}.weight", one.weight, (size,), "a row", positive=True)
+            group = each if one.each else fixed
+            group.append((row, weight, np.tile(held[:, None], size), on_inputs))
+        (fixed_rows, *of_fixed), (each_rows, *of_each) = (
+            (ca.vertcat(*rows), *map(np.hstack, others))
+            for rows, *others in (zip(*group, strict=True) for group in (fixed, each))
+        )
+        results = [next_x, cost, final, first, fixed_rows, each_rows]
+        self._function = ca.Function("problem", [x, u, theta, d, line], results)
+        self.weights, self.active, self.on_inputs = (
+            np.hstack([once, *[again] * self.lines])
+            for once, again in zip(of_fixed, of_each, strict=True)
+        )
 
     @cached_property
     def expressions(self) -> Expressions:
         """The problem in symbols."""
-        x, u, theta, d, line = given = self._function.sx_in()
-        next_x, *costs, fixed, each = self._function.call(given)
-        stage, terminal, initial = costs
-        return Expressions(x, u, theta, d, next_x, stage, terminal, initial, fixed, line, each)
+        given = self._function.sx_in()
+        return Expressions(*given, *self._function.call(given))
 
     @property
     def soft(self) -> NDArray[np.bool_]:
@@ -209,14 +260,9 @@ class Problem(Described):
         found: NDArray[np.bool_] = np.isfinite(self.weights)
         return found
 
-    @property
-    def own_size(self) -> int:
-        """How many data of a stage belong to no line."""
-        return self.own_names.size
-
     def own(self, data: Any) -> Any:
-        """Those of a stage, or of all, that belong to no line."""
-        return data[..., : self.own_size]
+        """Data of a stage, or of all, that belong to no line."""
+        return data[..., : self.own_names.size]
 
     def rows(self, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
         """h and g of a stage, those of lines last, shape (M,); `data` are all of the stage."""
@@ -224,15 +270,12 @@ class Problem(Described):
 
     def _of_rows(self, function: ca.Function, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
         """The last results of a function, of fixed rows and of a line's, for all lines."""
-        own, width = data[: self.own_size], self.line_names.size
-        begins = range(self.own_size, self.own_size + self.lines * width, max(width, 1))
-        *_, fixed, _ = function(x, u, theta, own, ca.DM.zeros(width))
-        each = [function(x, u, theta, own, data[at : at + width])[-1] for at in begins]
+        own, width = self.own_names.size, self.width
+        given = x, u, theta, data[:own]
+        fixed = function(*given, ca.DM.zeros(width))[-2]
+        begins = range(own, own + self.lines * width, max(width, 1))
+        each = [function(*given, data[at : at + width])[-1] for at in begins]
         return ca.vertcat(ca.SX(0, 1), fixed, *each)
-
-    def _every(self, fixed: Any, each: Any) -> NDArray[Any]:
-        """Values of all rows, of values of the fixed ones and of those of a line."""
-        return np.concatenate([fixed, np.tile(each, self.lines)])
 
     @cached_property
     def cost_scale(self) -> float:
@@ -263,14 +306,15 @@ class Problem(Described):
 
         A row that nothing moves there, as where its data are zeros, has no size to be read.
         """
-        still = np.clip(np.zeros(self.inputs), self.lower, self.upper)
-        at = [
-            ca.evalf(self.all_row_sizes(ca.DM(k * self.sizes[0]), ca.DM(still), ca.DM(self.theta),
-                                        ca.DM(self.data[0])))
-            for k in (-1, 0, 1)
-        ]  # fmt: skip
-        found: Vector = np.max([one.full().ravel() for one in at], axis=0, initial=0.0)
+        given = [ca.DM(one) for one in (self.still, self.theta, self.data[0])]
+        at = [self.all_row_sizes(ca.DM(k * self.sizes[0]), *given) for k in (-1, 0, 1)]
+        found: Vector = np.max([ca.evalf(one).full().ravel() for one in at], axis=0, initial=0.0)
         return np.where(found > LEAST, found, 1.0)
+
+    @cached_property
+    def still(self) -> Vector:
+        """The input nearest to 0."""
+        return np.clip(np.zeros(self.inputs), self.lower, self.upper)
 
     @cached_property
     def solved(self) -> "Problem":
@@ -308,98 +352,14 @@ class Problem(Described):
         """The data as machine code takes them, which could be written to and are not."""
         return self.data.copy()
 
-    def _written(
-        self,
-        model: Callable[..., Any],
-        stage: Callable[..., Any],
-        terminal: Callable[..., Any] | None,
-        initial: Callable[..., Any] | None,
-        given: Rows,
-    ) -> tuple[ca.Function, list[int]]:
-        """The problem as a function that can be pickled, and how many rows each `Soft` has."""
-        x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
-        theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.own_names.size)
-        line = ca.SX.sym("line", self.line_names.size)
-        th, known = self.names.symbols(theta), self.own_names.symbols(d)
-        last: tuple[Symbols, ...] = (th, known) if self.own_names else (th,)
-        in_line = (th, Symbols.joined(known, self.line_names.symbols(line)))
-        arguments = {"x": x, "u": u, "theta": theta, "d": d}
-        both, alone = ((x, u, *last), arguments), ((x, *last), {**arguments, "u": None})
-        of_line = ((x, u, *in_line), {**arguments, "line": line})
-        next_x = expression("model", model, *both, self.states, "state")
-        cost = expression("stage", stage, *both, 1, "cost")
-        final = expression("terminal", terminal, *alone, 1, "cost")
-        first = expression("initial", initial, *alone, 1, "cost")
-        rows = [
-            expression(name, one.row, *(of_line if one.each else both), 0, "row")
-            for name, one in given.items()
-        ]
-        z = ca.vertcat(x, u)
-        for name, row in zip(given, rows, strict=True):
-            if not _depends(row, z).all():
-                raise ValueError(
-                    f"{name} has a row that depends on neither x nor u: no plan can change it"
-                )
-        of_lines = [bool(one.each) for one in given.values()]
-        fixed, each = (
-            ca.vertcat(ca.SX(0, 1), *(rows[k] for k in range(len(rows)) if of_lines[k] == it))
-            for it in (False, True)
-        )
-        results = [next_x, cost, final, first, fixed, each]
-        function = ca.Function("problem", [x, u, theta, d, line], results)
-        return function, [row.numel() for row in rows]
-
-    def _spread(self, given: Rows, sizes: list[int]) -> tuple[Vector, NDArray[np.bool_]]:
-        """W of every row, infinite where it is hard, and whether it holds at each stage."""
-        stages = np.arange(self.horizon + 1)
-        e = self.expressions
-        weights: tuple[list[Vector], ...] = ([np.zeros(0)], [np.zeros(0)])
-        active: tuple[list[NDArray[np.bool_]], ...] = ([], [])
-        u = {False: _depends(e.fixed, e.u), True: _depends(e.each, e.u)}
-        begin = {False: 0, True: 0}
-        for (name, one), size in zip(given.items(), sizes, strict=True):
-            of_line = bool(one.each)
-            place = slice(begin[of_line], begin[of_line] + size)
-            begin[of_line] += size
-            chosen = _stages(name, one.stages, stages, bool(u[of_line][place].any()))
-            weights[of_line].append(_weights(name, one, size))
-            active[of_line].append(np.tile(chosen[:, None], size))
-        nothing = np.zeros((stages.size, 0), bool)
-        fixed, each = (np.hstack([nothing, *part]) for part in active)
-        return (
-            read_only(self._every(*map(np.concatenate, weights))),
-            np.hstack([fixed, *[each] * self.lines]),
-        )
-
-    def _refuse_outside(self) -> None:
-        for name in self.names:
-            low, start, high = (
-                self.names.part(name, v) for v in (self.theta_lower, self.theta, self.theta_upper)
-            )
-            if not ((low <= start) & (start <= high)).all():
-                raise ValueError(f"theta {name!r} starts at {start}, outside {low} and {high}")
-
-
-def discount(gamma: Any) -> float:
-    """A discount factor.
-
-    Raises:
-        ValueError: it does not lie in (0, 1].
-    """
-    if not 0 < gamma <= 1:
-        raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
-    return float(gamma)
-
 
 def _bends(problem: Problem, share: float) -> tuple[Matrix, Matrix]:
     """Hessian and gradient in (x, u) of a stage's cost and a share of the last, around 0."""
     e = problem.expressions
     z, costs = ca.vertcat(e.x, e.u), e.stage + share * e.terminal
     both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
-    still = np.clip(np.zeros(problem.inputs), problem.lower, problem.upper)
-    curvature, slope = both(
-        np.zeros(problem.states), still, problem.theta, problem.own(problem.data[0])
-    )
+    data = problem.own(problem.data[0])
+    curvature, slope = both(np.zeros(problem.states), problem.still, problem.theta, data)
     return curvature.full(), slope.full()
 
 
@@ -415,46 +375,14 @@ def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
     bends = np.diag(_bends(problem, 1.0)[0])
     usual = np.where((bends > 0) & (bends < np.inf), np.maximum(bends, LEAST) ** -0.5, 1.0)
     states, inputs = usual[: problem.states], usual[problem.states :]
-    if scale is None and ((states > SMALL) & (states < LARGE)).all():
-        return _ones(problem)
     if scale is not None:
-        states = np.array(scale, float)
-        if (
-            states.shape not in ((), (1,), (problem.states,))
-            or not ((states > 0) & (states < np.inf)).all()
-        ):
-            raise ValueError(
-                f"scale = {scale!r} must hold {problem.states} positive numbers, one a state"
-            )
+        states = spread("scale", scale, states.shape, "a state", positive=True)
+    elif ((states > SMALL) & (states < LARGE)).all():
+        return _ones(problem)
     half = (problem.upper - problem.lower) / 2
     inputs = np.where(half < np.inf, half, inputs)
-    rounded = (2.0 ** np.round(np.log2(size)) for size in (states, inputs))
-    spread = zip(rounded, (problem.states, problem.inputs), strict=True)
-    states, inputs = (read_only(np.broadcast_to(size, count)) for size, count in spread)
+    states, inputs = (read_only(2.0 ** np.round(np.log2(size))) for size in (states, inputs))
     return states, inputs
-
-
-def _spread(name: str, bound: Any, start: Matrix) -> Vector:
-    try:
-        return np.broadcast_to(np.asarray(bound, float), start.shape).ravel()
-    except ValueError:
-        raise ValueError(
-            f"theta {name!r} has shape {start.shape} and a bound of shape {np.shape(bound)}"
-        ) from None
-
-
-def _bounds(of: str, lower: Any, upper: Any, count: int) -> tuple[Vector, Vector]:
-    sides, (one, each) = [], ("state", "a state") if of else ("input", "an input")
-    for name, value in ((f"{of}lower", lower), (f"{of}upper", upper)):
-        side = np.array(value, float)
-        if side.shape not in ((), (1,), (count,)) or np.isnan(side).any():
-            raise ValueError(f"{name} = {value!r} must hold {count} numbers, one {each}")
-        sides.append(read_only(np.broadcast_to(side, count)))
-    if not (sides[0] < sides[1]).all():
-        raise ValueError(
-            f"{of}lower = {sides[0]} must lie below {of}upper = {sides[1]}, or no {one} is allowed"
-        )
-    return sides[0], sides[1]
 
 
 def _rows(name: str, given: Any, kind: Any) -> Rows:
@@ -481,33 +409,18 @@ def _family(rows: Rows, data: Mapping[str, Any]) -> str | None:
     return next(iter(names), None)
 
 
-def _stages(name: str, asked: Any, stages: NDArray[Any], on_inputs: bool) -> NDArray[np.bool_]:
+def _stages(name: str, asked: Any, last: int, *, on_inputs: bool) -> NDArray[np.bool_]:
     """Whether rows hold at each stage."""
+    held = np.zeros(last + 1, bool)
     try:
-        chosen = stages if asked is None else np.atleast_1d(stages[asked])
+        held[slice(last + 1 - on_inputs) if asked is None else asked] = True
     except (IndexError, TypeError) as error:
+        raise ValueError(f"{name}.stages = {asked!r} must lie among 0, ..., {last}") from error
+    if on_inputs and held[last]:
         raise ValueError(
-            f"{name}.stages = {asked!r} must lie among 0, ..., {stages[-1]}"
-        ) from error
-    if on_inputs and asked is None:
-        chosen = stages[:-1]
-    if on_inputs and stages[-1] in chosen:
-        raise ValueError(
-            f"{name} depends on u, and there is no input at stage {stages[-1]}: leave that"
-            " stage out"
+            f"{name} depends on u, and there is no input at stage {last}: leave that stage out"
         )
-    return np.isin(stages, chosen)
-
-
-def _weights(name: str, row: Soft | Hard, size: int) -> Vector:
-    if isinstance(row, Hard):
-        return np.full(size, np.inf)
-    weight = np.array(row.weight, float)
-    if weight.shape not in ((), (1,), (size,)):
-        raise ValueError(f"{name} has {size} rows and {weight.size} weights")
-    if not ((weight > 0) & np.isfinite(weight)).all():
-        raise ValueError(f"{name}.weight = {row.weight} must be positive")
-    return np.broadcast_to(weight, size)
+    return held
 
 
 def _depends(rows: ca.SX, variables: ca.SX) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.content import Described
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, Soft
-from nmpcrl.control.vectors import read_only
+from nmpcrl.control.vectors import box, spread
 
 NO_DATA = np.zeros(0)
 
@@ -84,18 +84,14 @@ class Task(Described):
     target_may_lie_outside: bool = False  # only to show what the paper's printed box does
 
     def __post_init__(self) -> None:
+        shape = np.shape(self.start)
         for name in ("start", "target", "lower", "upper", "weights"):
-            vector = read_only(getattr(self, name))
-            if vector.shape != np.shape(self.start) or np.isnan(vector).any():
-                raise ValueError(
-                    f"task.{name} = {vector} must hold {np.size(self.start)} numbers, as start does"
-                )
-            object.__setattr__(self, name, vector)
+            value = spread(f"task.{name}", getattr(self, name), shape, "a state")
+            object.__setattr__(self, name, value)
+        box("task.", self.lower, self.upper, len(self.start), "a state")
         for name in ("robot_diameter", "near", "margin", "penalty"):
             if not 0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"task.{name} = {getattr(self, name)} must be 0 or more")
-        if not (self.lower < self.upper).all():
-            raise ValueError(f"task.lower = {self.lower} must lie below upper = {self.upper}")
         self._refuse_outside("start")
         if not self.target_may_lie_outside:
             self._refuse_outside("target")

@@ -19,3 +19,31 @@ def positive_integer(name: str, number: Any) -> int:
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
         raise ValueError(f"{name} = {number!r} must be a whole number, 1 or more")
     return int(number)
+
+
+def spread(
+    name: str, value: Any, shape: tuple[int, ...], each: str, *, positive: bool = False
+) -> Vector:
+    """A read-only array of a shape, of one number or as many, `each` belonging to something.
+
+    Raises:
+        ValueError: the value has another shape, holds nan, or is not `positive` and finite.
+    """
+    array = np.array(value, float)
+    kind = "positive numbers" if positive else "numbers"
+    allowed = (array > 0) & (array < np.inf) if positive else ~np.isnan(array)
+    if array.shape not in ((), (1,), shape) or not allowed.all():
+        count = int(np.prod(shape))
+        raise ValueError(f"{name} = {array} must hold {count} {kind}, one {each}")
+    return read_only(np.broadcast_to(array, shape))
+
+
+def box(of: str, lower: Any, upper: Any, count: int, each: str) -> tuple[Vector, Vector]:
+    """Both sides of a box, `spread`; ValueError unless `lower` lies below `upper`."""
+    low, high = (
+        spread(f"{of}{side}", value, (count,), each)
+        for side, value in (("lower", lower), ("upper", upper))
+    )
+    if not (low < high).all():
+        raise ValueError(f"{of}lower = {low} must lie below {of}upper = {high}")
+    return low, high

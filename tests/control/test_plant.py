@@ -75,7 +75,7 @@ def plant(**changed):
     [
         ({"upper": np.ones(2)}, r"plant.upper = \[1. 1.\] must hold 1 numbers"),
         ({"lower": [np.nan]}, r"plant.lower = \[nan\] must hold 1 numbers"),
-        ({"lower": BOUND}, r"plant.lower = \[1.\] must lie below upper = \[1.\]"),
+        ({"lower": BOUND}, r"plant.lower = \[1.\] must lie below plant.upper = \[1.\]"),
         ({"period": 0.0}, r"plant.period = 0.0 must be a positive number"),
         ({"period": np.inf}, r"plant.period = inf must be a positive number"),
         ({"period": np.nan}, r"plant.period = nan must be a positive number"),

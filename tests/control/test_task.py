@@ -79,7 +79,7 @@ def test_a_target_outside_the_box_can_be_asked_for():
         ({"target": np.array([8.5, 2.0])}, "task.target = .* must hold 3 numbers"),
         ({"target": np.array([8.5, np.nan, 0.0])}, "task.target = .* must hold 3 numbers"),
         ({"weights": np.ones(2)}, "task.weights = .* must hold 3 numbers"),
-        ({"lower": np.array([9.0, -3, -np.inf])}, "task.lower = .* must lie below upper"),
+        ({"lower": np.array([9.0, -3, -np.inf])}, "task.lower = .* must lie below task.upper"),
         ({"near": -1.0}, "task.near = -1.0 must be 0 or more"),
         ({"margin": np.nan}, "task.margin = nan must be 0 or more"),
         ({"penalty": np.inf}, "task.penalty = inf must be 0 or more"),
