@@ -69,7 +69,11 @@ def mx(nmpc: Nmpc) -> Solve:
 
 def rebuilt(nmpc: Nmpc) -> Solve:
     """A function of state, theta and the last plan that writes the problem anew at every call."""
-    return lambda state, theta, last=None: mx(nmpc)(state, theta, last)
+
+    def solve(state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
+        return mx(nmpc)(state, theta, last)
+
+    return solve
 
 
 def _written(

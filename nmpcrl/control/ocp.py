@@ -132,82 +132,69 @@ def transcribe(problem: Problem, *, fix_action: bool, ties_active: bool = False)
     path = ca.Function("path", [e.x, e.u, e.theta, e.d], [e.next_x, e.stage])
     start = ca.Function("start", [e.x, e.theta, e.d], [e.initial])
     final = ca.Function("final", [e.x, e.theta, e.d], [e.terminal])
-    variables, constraints = _Stack(), _Stack()
+    slack_of = np.cumsum(soft) - 1
+    variables: list[tuple[str, ca.SX]] = []
+    constraints: list[tuple[str, ca.SX]] = []
     objective = start(state, theta, data[: problem.own_names.size, 0])
     for i in range(N + 1):
-        d, own = data[:, i], data[: problem.own_names.size, i]
-        last, free = i == N, fix_action and i == 0
-        box = (problem.state_lower, problem.state_upper) if i > 0 else (-np.inf, np.inf)
-        variables.add("states", x[i], *box)
-        where = state if i == 0 else x[i]
-        given = ca.SX.zeros(problem.inputs) if last else action if free else u[i]
-        rows = problem.rows(where, given, theta, d)
-        if last:
-            objective += problem.gamma**i * final(x[i], theta, own)
-        else:
-            bounds = (-np.inf, np.inf) if free else (problem.lower, problem.upper)
-            variables.add("inputs", u[i], *bounds)
+        own, discount = data[: problem.own_names.size, i], problem.gamma**i
+        variables.append(("states", x[i]))
+        if i < N:
+            variables.append(("inputs", u[i]))
             next_x, cost = path(x[i], u[i], theta, own)
-            constraints.add("dynamics", x[i + 1] - next_x, 0, 0)  # departure O
-            objective += problem.gamma**i * cost
-        variables.add("slacks", sigma[i], 0, np.inf)
-        objective += problem.gamma**i * ca.dot(problem.weights[soft], sigma[i])
+            constraints.append(("dynamics", x[i + 1] - next_x))  # departure O
+            given = action if fix_action and i == 0 else u[i]
+        else:
+            cost, given = final(x[i], theta, own), ca.SX.zeros(problem.inputs)
+        variables.append(("slacks", sigma[i]))
+        objective += discount * cost
+        objective += discount * ca.dot(problem.weights[soft], sigma[i])
         if i == 0:
-            constraints.add("initial", x[0] - state, 0, 0)
-            constraints.add("fixed_action", (u[0] - action) if fix_action else ca.SX(0, 1), 0, 0)
+            constraints.append(("initial", x[0] - state))
+            constraints.append(("fixed_action", u[0] - action if fix_action else ca.SX(0, 1)))
+        h = problem.rows(state if i == 0 else x[i], given, theta, data[:, i])
         on = problem.active[i] & (soft | (i > 0) | (problem.on_inputs & (not fix_action)))
-        held = [rows[j] if on[j] else ca.SX(-1) for j in range(soft.size)]
-        for j, k in zip(np.flatnonzero(soft), range(soft.size), strict=False):
-            held[j] -= sigma[i][k]
-        constraints.add("rows", ca.vertcat(ca.SX(0, 1), *held), -np.inf, 0)
-
+        held = [
+            (h[j] if on[j] else -1) - (sigma[i][slack_of[j]] if soft[j] else 0)
+            for j in range(soft.size)
+        ]
+        constraints.append(("rows", ca.vertcat(ca.SX(0, 1), *held)))
+    z, of_z = _stacked(variables)
+    g, of_g = _stacked(constraints)
+    lower, upper = np.full(z.numel(), -np.inf), np.full(z.numel(), np.inf)
+    states, inputs = of_z["states"][1:], of_z["inputs"][int(fix_action) :]
+    lower[states], upper[states] = problem.state_lower, problem.state_upper
+    lower[inputs], upper[inputs] = problem.lower, problem.upper
+    lower[of_z["slacks"]] = 0
+    equality = np.full(g.numel(), True)
+    equality[of_g["rows"]] = False
     return Ocp(
         problem=problem,
         parameters=ca.vertcat(state, theta, action, ca.vec(data)),
         theta=theta,
         ties_active=ties_active,
-        variables=variables.expression,
+        variables=z,
         objective=objective,
-        constraints=constraints.expression,
-        equality=constraints.lower == constraints.upper,
-        lower=variables.lower,
-        upper=variables.upper,
-        initial=constraints.where("initial")[0],
-        fixed_action=constraints.where("fixed_action")[0],
-        **{name: variables.where(name) for name in ("states", "inputs", "slacks")},
-        dynamics=constraints.where("dynamics"),
-        obstacles=constraints.where("rows")[:, soft],
-        hard=constraints.where("rows")[:, ~soft],
+        constraints=g,
+        equality=equality,
+        lower=lower,
+        upper=upper,
+        **of_z,
+        initial=of_g["initial"][0],
+        fixed_action=of_g["fixed_action"][0],
+        dynamics=of_g["dynamics"],
+        obstacles=of_g["rows"][:, soft],
+        hard=of_g["rows"][:, ~soft],
     )
 
 
-class _Stack:
-    """Expressions put on top of each other, with their bounds and where each kind ended up."""
-
-    def __init__(self) -> None:
-        self._parts: list[ca.SX] = []
-        self._bounds: list[tuple[Vector, Vector]] = []
-        self._rows: dict[str, list[Indices]] = {}
-        self._size = 0
-
-    def add(self, kind: str, part: ca.SX, lower: Any, upper: Any) -> None:
-        size = part.numel()
-        self._parts.append(part)
-        self._bounds.append((np.broadcast_to(lower, size), np.broadcast_to(upper, size)))
-        self._rows.setdefault(kind, []).append(np.arange(self._size, self._size + size))
-        self._size += size
-
-    def where(self, kind: str) -> Indices:
-        return np.array(self._rows[kind], dtype=int)
-
-    @property
-    def expression(self) -> ca.SX:
-        return ca.vertcat(*self._parts)
-
-    @property
-    def lower(self) -> Vector:
-        return np.concatenate([lower for lower, _ in self._bounds]).astype(float)
-
-    @property
-    def upper(self) -> Vector:
-        return np.concatenate([upper for _, upper in self._bounds]).astype(float)
+def _stacked(parts: list[tuple[str, ca.SX]]) -> tuple[ca.SX, dict[str, Indices]]:
+    """Expressions on top of each other, and the places of those of a kind, a row each."""
+    where: dict[str, list[Indices]] = {}
+    size = 0
+    for kind, part in parts:
+        where.setdefault(kind, []).append(np.arange(size, size + part.numel()))
+        size += part.numel()
+    return ca.vertcat(*(part for _, part in parts)), {
+        kind: np.array(rows, dtype=int) for kind, rows in where.items()
+    }

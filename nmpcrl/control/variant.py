@@ -64,14 +64,14 @@ class Variant:
 
     def policy(self, solution: Solution) -> Matrix:
         """As `Nmpc.policy_jacobian`."""
-        found = self._compiled(Compiled.policy, solution)
+        found: Matrix | None = self._compiled(Compiled.policy, solution)
         if found is None:
             found = self._dense(self._sensitivity.plan, solution)[self.ocp.inputs[0]]
         return self.units.inputs[:, None] * found
 
     def feedback(self, solution: Solution) -> Matrix:
         """As `Nmpc.policy_feedback`."""
-        found = self._compiled(Compiled.feedback, solution)
+        found: Matrix | None = self._compiled(Compiled.feedback, solution)
         if found is None:
             found = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
         return self.units.inputs[:, None] * found / self.units.states
