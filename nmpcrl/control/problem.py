@@ -331,6 +331,11 @@ class Problem(Described):
         vars(other).update(_function=function, sizes=_ones(self), **bounds)
         return other
 
+    @cached_property
+    def machine_code(self) -> dict[str, Any]:
+        """What was compiled for it, by name."""
+        return {}
+
     def split(self, theta: Vector) -> dict[str, Any]:
         """A vector in the order of theta, or of its gradient, by name."""
         return self.names.split(np.asarray(theta, float))

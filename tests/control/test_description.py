@@ -185,10 +185,6 @@ def test_a_key_says_what_a_user_wrote():
         _ = plain.key
 
 
-def test_a_key_of_the_papers_controller_names_runs_that_are_stored():
-    assert paper.nmpc().key.startswith("739cdfb231ec78f3cad5")
-
-
 def test_without_numba_the_key_is_that_of_what_solves(monkeypatch):
     key, other = paper.nmpc().key, Nmpc(cart(), solver=Fatrop()).key
     monkeypatch.setattr(jit, "numba_version", lambda: None)

@@ -15,7 +15,6 @@ from nmpcrl.control.codegen import jit
 from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.problem import Problem
-from nmpcrl.control.remembered import remembered
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
@@ -65,7 +64,6 @@ class Arguments(NamedTuple):
     tie: float
 
 
-@remembered
 def machine_code(problem: Problem) -> Any:
     """`find.find` compiled for a problem.
 
@@ -75,20 +73,22 @@ def machine_code(problem: Problem) -> Any:
     return _loaded("find", problem, NOTICE)
 
 
-@remembered
 def slopes_code(problem: Problem) -> Any:
     """`slopes.slopes` compiled for a problem."""
     return _loaded("slopes", problem, PLAN_NOTICE)
 
 
 def _loaded(entry: str, problem: Problem, notice: str) -> Any:
-    """The function of a module that has its name, compiled with a model."""
+    """The function of a module that has its name, compiled with a model once for a problem."""
+    if entry in problem.machine_code:
+        return problem.machine_code[entry]
     texts = {
         "__init__": f"from .{entry} import {entry}\n",
         "model": stages.write(problem),
         **{name: TEXTS[name] for name in PARTS[entry]},
     }
-    return getattr(load("riccati", texts, notice), entry)
+    problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
+    return problem.machine_code[entry]
 
 
 @dataclass(frozen=True)
