@@ -28,33 +28,21 @@ from nmpcrl.study.store import fetch
 
 
 def publish_study(
-    runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
+    runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str], *, anew: bool
 ) -> Path:
-    """Publish the study anew, with searches, the audit of C8 and times of steps made here.
+    """As `publish_runs`, with the main table also the audit of C8 and the searches, made here.
 
-    Args:
-        runs: all of `design.whole_study`.
-        variants: the part of the study that each belongs to.
+    The whole study is published `anew`, with times of steps that are taken here.
     """
-    timings = time_learners_repeatedly()
-    place = publish_parts(runs, variants, anew=True)
-    publish_times(timings)
-    return place
-
-
-def publish_parts(
-    runs: Mapping[Experiment, RunSummary],
-    variants: Mapping[Experiment, str],
-    *,
-    anew: bool = False,
-) -> Path:
-    """As `publish_runs`, and with the main table the audit of C8 and the searches, made here."""
+    timings = time_learners_repeatedly() if anew else None
     if design.MAIN_TABLE not in {variants[e] for e in runs}:
         return publish_runs(runs, variants, anew=anew)
     records = fetch(published.AUDITED)
     audit = measured(published.AUDITED, records, dropped_curvature(records))
     place = publish_runs(runs, variants, anew=anew, audit=audit)
     publish_searches(search_all([*map(Search, design.LAYOUTS)]))
+    if timings is not None:
+        publish_times(timings)
     return place
 
 
@@ -67,13 +55,8 @@ def publish_runs(
 ) -> Path:
     """Publish runs that were trained here beside the published ones, in the folder returned.
 
-    Parts that were published in earlier epochs are replaced, and must be whole.
-
-    Args:
-        runs: with the run with theta frozen beside each, unless that is published.
-        variants: the part of the study that each belongs to.
-        anew: whether the published runs are forgotten.
-        audit: of `published.AUDITED`.
+    The run with theta frozen beside each must be among these or those. Parts that were published in
+    earlier epochs are replaced, and must be whole; all published runs are forgotten if `anew`.
     """
     earlier = Published() if anew else published.load()
     known, older = {*earlier.rows, *runs}, {p for p in earlier.parts if not earlier.is_current(p)}
@@ -118,10 +101,9 @@ def publish_times(timings: pd.DataFrame) -> Path:
 
 
 def publish_timing() -> tuple[Verdict, ...]:
-    """Time the learners here, in ten rounds of fresh processes, and publish the times.
+    """Time the learners here, and publish the times if they decide all claims about time.
 
-    Nothing is published unless the times decide all claims about time, since the machine may be
-    busy. The verdicts on these claims are returned.
+    The verdicts on these claims are returned.
     """
     timings = time_learners_repeatedly()
     judged = judge(BY_TIME, timings=timings)

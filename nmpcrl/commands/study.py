@@ -64,10 +64,9 @@ def study(
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: written")
     if publish:
-        from nmpcrl.claims.publish import publish_parts, publish_study
+        from nmpcrl.claims.publish import publish_study
 
-        place = (publish_parts if parts else publish_study)(found, wanted)
-        click.echo(f"{place}: published")
+        click.echo(f"{publish_study(found, wanted, anew=not parts)}: published")
         _judge()
     if len(found) < len(wanted):
         raise SystemExit(1)  # the reasons are printed
