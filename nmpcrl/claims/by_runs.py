@@ -1,7 +1,6 @@
 """Claims that runs decide: each run, or pair of runs, has a number, and yes ends at a border.
 
-Three classes ask three questions of the numbers. The number of a missing run, or an unknown number,
-is nan, and then the answer is missing, too.
+Three classes ask three questions of the numbers. The answer is missing where the number is nan.
 """
 
 import operator
@@ -58,13 +57,9 @@ class RunClaim(Claim):
 
     def judge(self, observed: Observations) -> Verdict:
         """The verdict, by the rule of `rule`, with further numbers."""
-        further = self.numbers and self.numbers(observed.runs, observed.paths, self.learners)
-        return replace(self.settled(observed), numbers=further or {})
-
-    def settled(self, observed: Observations) -> Verdict:
-        """The verdict with its counts, without the further numbers, which take longer."""
         answers, weaker = self.asked(observed)
-        return settle(self, answers, weaker=weaker, unit=self.unit)
+        further = self.numbers and self.numbers(observed.runs, observed.paths, self.learners)
+        return replace(settle(self, answers, weaker, self.unit), numbers=further or {})
 
     def asked(self, observed: Observations) -> tuple[pd.Series, pd.Series]:
         """The answers to the claim's question, and to its weaker one (else the same)."""
@@ -75,11 +70,9 @@ class RunClaim(Claim):
         return answers & _known(counts == 0, counts), answers
 
     def at_borders(self, values: Values, borders: Iterable[float]) -> pd.DataFrame:
-        """The outcome at other borders than the claim's own.
+        """The outcome of the known answers at other borders, by `rule.read`; no row without any.
 
-        Returns:
-            Columns border, share (of yes), low and high (its interval) and outcome, by `rule.read`
-            for the known answers; no row without answers.
+        Columns border, share (of yes), low and high (ends of its interval) and outcome.
         """
         rows = []
         for border in borders:
@@ -136,10 +129,8 @@ def halves(
 ) -> tuple[Halves, ...]:
     """Both halves of a contrast in each reading of the decay.
 
-    Args:
-        learners: by the claim the first goes wrong, and the second does not.
-        values: a number of each run, a column a learner.
-        borders: by the way to go wrong, the number above which a run does; the claim's own first.
+    `borders` have, by the way to go wrong, the number above which a run does; the claim's own
+    first.
     """
     found = []
     for wrong, border in borders.items():

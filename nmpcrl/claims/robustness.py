@@ -14,7 +14,7 @@ import pandas as pd
 from scipy import stats
 
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import CELL, Observations, Paths
+from nmpcrl.claims.rule import CELL, Paths, judge
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -28,7 +28,7 @@ PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures 
 # `base_share` are of yes; `pairs` is the number of answers; `p` is the probability of shares so
 # different without an effect (Fisher's exact test, as if runs were independent). A layout has no p:
 # its runs hardly differ from seed to seed, so that it is one observation.
-COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
+COLUMNS = ["variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p"]
 
 
 def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
@@ -36,8 +36,7 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     `runs` have a column `variant`. `COLUMNS` come after `departure`, its letter or "".
     """
-    main = Observations(runs[runs.variant == MAIN_TABLE], paths)
-    verdicts = [claim.settled(main) for claim in BY_RUNS.values()]
+    verdicts = judge(BY_RUNS, runs[runs.variant == MAIN_TABLE], paths)
     rows = [part_changes(verdicts), variant_changes(runs, paths)]
     found = pd.concat(rows, ignore_index=True)
     found.insert(0, "departure", found.variant.map(departure))
@@ -69,33 +68,25 @@ def _part(variant: str) -> tuple[str, str]:
 
 
 def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """The outcome of every claim in every variant, beside the same cells of the main table.
+    """`COLUMNS` of every claim in every variant, beside the same cells of the main table.
 
     A variant runs only the learners of the paper that it changes; the others' runs come from the
     main table. A claim that asks none of the changed learners has no row, nor have the controls.
-    `runs` and `paths` are of the variants and of the main table.
-
-    Returns:
-        `COLUMNS`, one row a variant and claim, in order.
     """
     runs, rows = runs[runs.learner.isin(PAPER)], []
     for name in runs.variant[runs.variant != MAIN_TABLE].unique():
         changed = {*runs.learner[runs.variant == name]}
-        after, before = (Observations(one, paths) for one in groups(runs, name))
-        for claim in BY_RUNS.values():
-            if changed & {*claim.learners}:
-                both = (claim.settled(one) for one in (after, before))
-                rows.append(_row(name, claim.name, *((v.outcome, v.counts["all"]) for v in both)))
-    return pd.DataFrame(rows, columns=[*COLUMNS])
+        asked = {one: claim for one, claim in BY_RUNS.items() if changed & {*claim.learners}}
+        for both in zip(*(judge(asked, one, paths) for one in groups(runs, name)), strict=True):
+            rows.append(_row(name, both[0].claim, *((v.outcome, v.counts["all"]) for v in both)))
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:
-    """The outcome of every claim in the main table, and in each layout and reading of the decay.
+    """`COLUMNS` of every claim in the main table, and in each layout and reading of the decay.
 
-    A part changes a verdict only if the verdict depends on it: see `Verdict.depends_on`.
-
-    Returns:
-        `COLUMNS`; `base` is the overall outcome, `base_share` the share in the other parts.
+    `base` is the overall outcome, `base_share` the share in the other parts. A part changes a
+    verdict only if the verdict depends on it: see `Verdict.depends_on`.
     """
     parts = [(one, "", WHOLE, "all", one.outcome) for one in verdicts]
     for one in verdicts:
@@ -109,7 +100,7 @@ def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:
         row = _row(variant, one.claim, (outcome, (yes, of)), rest)
         row["changes"] = row["changes"] and one.depends_on(field)
         rows.append(row | ({"p": np.nan} if field == "layout" else {}))
-    return pd.DataFrame(rows, columns=[*COLUMNS])
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _row(variant: str, claim: str, judged: Judged, base: Judged) -> dict[str, Any]:
