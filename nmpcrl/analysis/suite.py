@@ -1,9 +1,8 @@
-"""The suite: judges learners, tuners and policies within a budget, in places of no tuning.
+"""The suite: judges learners, tuners and policies within a budget of episodes.
 
-An entry gets a `Robot` in one place, begins at most the budget of episodes, and returns theta or a
-policy, which a rollout without noise judges. A place is a layout or a scenario of moving obstacles;
-it is *solved* if under every seed the robot ends at the target and the rollout costs no more than
-under theta_init. Intervals are over places.
+An entry gets a `Robot` in one place, and returns theta or a policy, which a rollout without noise
+judges. A place is a layout or a scenario of moving obstacles; it is *solved* if under every seed
+the robot ends at the target and the rollout costs no more than under theta_init.
 
     >>> judge(entry("CMA-ES[spread=0.1]"), "J001", seed_of("J001", 0), 50).cost  # doctest: +SKIP
 """
@@ -23,33 +22,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl import Vector
+from nmpcrl import Vector, learning
 from nmpcrl.analysis.encounters import count
 from nmpcrl.analysis.search import LOWER, SCALE, SEARCHES, UPPER
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.control import Nmpc, Task
-from nmpcrl.learning import (
-    Diverged,
-    Exploration,
-    Learner,
-    Step,
-    Weights,
-    lstd_q,
-    policy_gradient,
-    train,
-)
+from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, remedies, train
 from nmpcrl.learning.gauss_newton import closed_loop
 from nmpcrl.learning.optimisers import TrustRegion
-from nmpcrl.learning.remedies import (
-    REGULARISATION,
-    averaged,
-    directed,
-    guarded,
-    judged_theta,
-    normalised_ges,
-    tdrc,
-    undo,
-)
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import absurd
 from nmpcrl.study import Experiment, paper
@@ -78,13 +58,6 @@ Change = Callable[..., Learner]  # (learner, robot, **settings)
 
 class OverBudget(Refusal):
     """An episode was begun beyond the budget."""
-
-
-class NoEntry(Refusal):
-    """An entry cannot be imported, or raised an error."""
-
-
-# The robot that an entry is given.
 
 
 class Robot:
@@ -160,9 +133,6 @@ class Robot:
             raise OverBudget(f"episode {self.begun} was begun with a budget of {self.budget}")
 
 
-# Entries.
-
-
 @dataclass(frozen=True, eq=False)
 class Entry:
     """A learner, tuner or policy with its settings: a function of a `Robot`.
@@ -182,7 +152,7 @@ class Entry:
         return {**self.defaults, **self.changed}
 
     def with_settings(self, **settings: float) -> "Entry":
-        """The entry with other settings; ParameterError for an unknown one, or one not above 0."""
+        """The entry with other settings, which are above 0."""
         for key, value in settings.items():
             if key not in self.defaults:
                 known = f"one of {', '.join(self.defaults)}" if self.defaults else "absent"
@@ -210,9 +180,9 @@ def learned(
 ) -> Vector:
     """The last finite theta of a learner of the study, trained as long as the budget lasts.
 
-    `change` gives another learner to train in its place. Settings are alpha, in proportion to which
-    beta of GES and TDC changes; `every`, the episodes between two confirming rollouts, which count;
-    and others for `change`.
+    `change` gives another learner to train in its place. Settings are alpha, with which beta of GES
+    and TDC changes in proportion; `every`, the episodes between two confirming rollouts, which
+    count; and others for `change`.
     """
     every = int(settings.get("every", 0))
     episodes = (robot.budget - 1) * every // (every + 1) if every else robot.budget
@@ -233,11 +203,11 @@ def learned(
     with suppress(Diverged):
         for step in robot.train(made, weights, explore, constrained=experiment.values_actions):
             weights = weights if absurd(step.weights) else step.weights
-    return judged_theta(weights)
+    return remedies.judged_theta(weights)
 
 
 def _guarded(learner: Learner, _: Robot, alpha: float) -> Learner:
-    return guarded(learner, alpha)
+    return remedies.guarded(learner, alpha)
 
 
 def _gn_j(_: Learner, robot: Robot, radius: float) -> Learner:
@@ -246,7 +216,7 @@ def _gn_j(_: Learner, robot: Robot, radius: float) -> Learner:
 
 def _undone(change: Change) -> Change:
     """`change`, with an undo of the steps after which a confirming rollout costs more."""
-    return lambda learner, robot, every, **settings: undo(
+    return lambda learner, robot, every, **settings: remedies.undo(
         change(learner, robot, **settings), robot.cost, int(every)
     )
 
@@ -273,25 +243,23 @@ ENTRIES: Mapping[str, Entry] = {
         Entry("frozen", lambda _: THETA.copy()),
         _searched("grid"),
         *(_learned(one, learner=one, alpha=ALPHA) for one in ("ES", "GES", "TDC", "RDES", "DES")),
-        _learned("TDRC", lambda _, robot, **own: tdrc(robot.controller, **own),
-                 alpha=ALPHA, regularisation=REGULARISATION),
-        _learned("GES-3", lambda _, robot, **own: normalised_ges(robot.controller, **own),
+        _learned("TDRC", lambda _, robot, **own: remedies.tdrc(robot.controller, **own),
+                 alpha=ALPHA, regularisation=remedies.REGULARISATION),
+        _learned("GES-3", lambda _, robot, **own: remedies.normalised_ges(robot.controller, **own),
                  alpha=ALPHA, ratio=3.0),
         _learned("guarded-ES", _guarded, alpha=ALPHA),
         _learned("guarded-RDES", _guarded, "RDES", alpha=ALPHA),
-        _learned("control-RDES",
-                 lambda learner, _, alpha: directed(guarded(learner, alpha), alpha),
-                 "RDES", alpha=ALPHA),
-        _learned("averaged-ES",
-                 lambda learner, robot, **_: averaged(learner, robot.budget * paper.STEPS // 2),
-                 alpha=ALPHA),
+        _learned("control-RDES", lambda learner, _, alpha: remedies.directed(
+            remedies.guarded(learner, alpha), alpha), "RDES", alpha=ALPHA),
+        _learned("averaged-ES", lambda learner, robot, **_: remedies.averaged(
+            learner, robot.budget * paper.STEPS // 2), alpha=ALPHA),
         _learned("undone-ES", _undone(lambda learner, *_, **__: learner), alpha=ALPHA, every=1),
-        _learned("undone-LSTD-Q", _undone(lambda _, robot, radius: lstd_q(
+        _learned("undone-LSTD-Q", _undone(lambda _, robot, radius: learning.lstd_q(
             robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS)),
             radius=RADIUS, every=1),
         _learned("GN-J", _gn_j, radius=RADIUS),
         _learned("undone-GN-J", _undone(_gn_j), radius=RADIUS, every=1),
-        _learned("DPG", lambda _, robot, radius: policy_gradient(
+        _learned("DPG", lambda _, robot, radius: learning.policy_gradient(
             robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS), radius=RADIUS),
         *map(_searched, ("SPSA", "CMA-ES", "Bayes")),
     )
@@ -301,8 +269,7 @@ ENTRIES: Mapping[str, Entry] = {
 def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
     """An entry by its name: "ES", "CMA-ES[spread=0.1]", or "my_module:factory".
 
-    A factory is a function of a `Robot`; its module may lie in the working directory. What is no
-    such name, or cannot be imported, is refused.
+    A factory is a function of a `Robot`; its module may lie in the working directory.
     """
     base, bracket, inner = name.partition("[")
     if base in known:
@@ -319,15 +286,12 @@ def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
         factory = pkgutil.resolve_name(name)
     except (Exception, SystemExit) as error:  # whatever the module raises
         why = shortened(f"{type(error).__name__}: {error}")
-        raise NoEntry(f"entry = {name!r} cannot be imported: {why}") from error
+        raise Refusal(f"entry = {name!r} cannot be imported: {why}") from error
     finally:
         sys.path.remove(here)
     if not callable(factory):
         raise refused("entry", name, f"the name of a function of a Robot, not of {factory!r}")
     return Entry(name, factory)
-
-
-# Judging.
 
 
 @dataclass(frozen=True)
@@ -355,10 +319,7 @@ def solved(judged: Any) -> Any:
 
 def judge(one: Entry | Callable[[Robot], Any], place: str | Centres, seed: int,
           episodes: int) -> Judgement:  # fmt: skip
-    """Judge an entry, or another function of a `Robot`, in one place by a rollout without noise.
-
-    ParameterError if it returns neither theta nor a policy.
-    """
+    """Judge an entry, or another function of a `Robot`, in one place by a rollout without noise."""
     robot, judging = Robot(place, episodes, seed), Robot(place, 2, seed)
     initial, seconds, began = judging.cost(THETA), 0.0, time.process_time()
     rollout = NO_ROLLOUT
@@ -396,10 +357,10 @@ def judge_all(
     seeds: int = 2,
     workers: int | None = None,
 ) -> pd.DataFrame:
-    """Judge an entry, by its name, in every place of the suite with every seed.
+    """Judge an entry, by its name, in the first `layouts` places with every seed.
 
-    The places are the first `layouts` of `JUDGE`, or with `moving` of the scenarios. One row a
-    judgement: entry, place, k and the fields of `Judgement`, repeatable except for seconds.
+    The places are those of `JUDGE`, or with `moving` the scenarios. A row has entry, place, k and
+    the fields of `Judgement`, repeatable except for seconds.
     """
     places = SCENARIOS if moving else JUDGE
     budget = whole(1, MOST_EPISODES).check("budget", budget)
@@ -416,7 +377,7 @@ def judge_all(
         found = dict(parallel(judged, jobs, workers, name))
     except Failed as error:
         (place, _), why, _ = error.failures[0]
-        raise NoEntry(f"entry = {name!r} failed in {place}: {shortened(why)}") from None
+        raise Refusal(f"entry = {name!r} failed in {place}: {shortened(why)}") from None
     return pd.DataFrame(
         [{"entry": name, "place": job[0], "k": job[1], **asdict(found[job])} for job in jobs]
     )
@@ -427,7 +388,7 @@ def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
 
     Columns entry, places (how many), solved and clear (of moving obstacles; shares of the places),
     gain (interquartile mean over places), episodes (most in a place), seconds, and over (the first
-    place in which the budget was exceeded, or ""); solved, gain and clear are of type `Estimate`.
+    place in which the budget was exceeded, or ""). Intervals are over places.
     """
     rows = []
     for name, runs in judged.groupby("entry", sort=False):

@@ -3,8 +3,7 @@
     parts (arms x places x seeds) -> conditions -> run -> rows -> questions -> answers
 
 Rows are stored one by one in `runs/NAME.jsonl`; complete arms are published as `NAME.csv`.
-`nmpcrl investigate` runs, resumes, publishes and judges. `nmpcrl.studies` has the investigations of
-the book, and a reader's own is one file.
+`nmpcrl.studies` has the investigations of the book, and a reader's own is one file.
 """
 
 import json
@@ -41,10 +40,6 @@ Arms: TypeAlias = Mapping[str, Any]  # the setting of each arm, by its name
 Run: TypeAlias = Callable[[Any, str, int, int], Row]  # (setting, place, episodes, seed)
 
 
-class NoInvestigation(Refusal):
-    """A file does not define an investigation."""
-
-
 class Condition(NamedTuple):
     """The name of a row: an arm in a place, with the k-th seed of that place."""
 
@@ -62,8 +57,8 @@ ROWS_OF = "rows of "  # before the name of an array: which rows of the table its
 class Part:
     """Every arm in every place with every seed.
 
-    Arms may depend on earlier rows (a setting that was tuned); they are then a function of the
-    table of these, and may raise a `Refusal` while it is incomplete.
+    Arms that depend on earlier rows, such as a tuned setting, are a function of the table of these,
+    which may raise a `Refusal` while it is incomplete.
     """
 
     run: Run
@@ -184,8 +179,8 @@ class Investigation:
     def _lines(self) -> dict[str, tuple[Row, str]]:
         """Rows by key, and the commit that had registered each when it was made.
 
-        Incomplete lines are ignored, and rows of sources that are neither these nor locked ones;
-        so are rows that are asked no more: of other keys, arms, places or seeds.
+        Incomplete lines are skipped, and rows of sources that are not accepted, or of other keys,
+        arms, places or seeds.
         """
         found, order = {}, cache(lambda part, arm: {*self.parts[part].order(arm)})
         for line in self.log.read_text("utf-8").splitlines() if self.log.exists() else ():
@@ -200,13 +195,9 @@ class Investigation:
                     found[key] = row, commit[0] if commit else ""
         return found
 
-    def rows(self) -> dict[str, Row]:
-        """The rows that were made here, by key."""
-        return {key: row for key, (row, _) in self._lines().items()}
-
     def made(self) -> pd.DataFrame:
         """The table of the rows that were made here."""
-        return pd.DataFrame([*self.rows().values()])
+        return pd.DataFrame([row for row, _ in self._lines().values()])
 
     @property
     def unregistered(self) -> int:
@@ -224,16 +215,11 @@ class Investigation:
 
     def missing(self, part: str) -> dict[Condition, Any]:
         """The conditions of a part without a row that was made here."""
-        rows = self.rows()
-        return {one: it for one, it in self.conditions(part).items() if self.key(one) not in rows}
+        made = self._lines()
+        return {one: it for one, it in self.conditions(part).items() if self.key(one) not in made}
 
     def complete(self, parts: Iterable[str] = (), workers: int | None = None) -> pd.DataFrame:
-        """Make every missing row, part by part; the table of all rows that were made here.
-
-        Args:
-            parts: by default all.
-            workers: processes; by default one per core.
-        """
+        """Make every missing row of parts, by default of all; the table of rows made here."""
         chosen = [*parts] or [*self.parts]
         self.log.parent.mkdir(parents=True, exist_ok=True)
         for part in filter(chosen.__contains__, self.parts):
@@ -273,15 +259,12 @@ class Investigation:
         return {one.name: replace(_asked(one, known), question=one.name) for one in self.questions}
 
     def publish(self) -> Path:
-        """Add the complete arms that were made here to the published table.
+        """Add the complete arms that were made here to the published table, or raise Unpublishable.
 
         Rows of earlier epochs are replaced part by part, once every arm of the part is complete.
-
-        Raises:
-            Unpublishable: an arm is published already with other numbers, or none is complete and
-                new.
         """
-        there, made, new = self._published(), self.made(), []
+        there, made, new = self._published(), self.made(), dict[Any, pd.DataFrame]()
+        older = {part for part in there.part.unique() if not self.is_current(part)}
         for (part, arm), rows in made.groupby(["part", "arm"], sort=False) if len(made) else ():
             by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
             if not {*order} <= {*by.index}:
@@ -289,20 +272,19 @@ class Investigation:
             block = by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
             old = there[(there.part == part) & (there.arm == arm)].reset_index(drop=True)
             same = [name for name in old if name != "seconds"]
-            if old.empty or not self.is_current(str(part)):
-                new.append(block)
+            if old.empty or part in older:
+                new[part, arm] = block
             elif not old[same].equals(block[same]):
                 raise Unpublishable(f"{arm} of the part {part!r} is published with other numbers")
-        added = pd.concat(new) if new else made[:0]
-        replaced = {part for part in there.part.unique() if not self.is_current(part)}
-        replaced &= {*added.part} if len(added) else set()
-        for part in [*replaced]:
-            if {*self.parts[part].settings(self.known())} - {*added[added.part == part].arm}:
-                replaced.remove(part)
-                added = added[added.part != part]
-        if added.empty:
+        replaced = {
+            part
+            for part in older & {part for part, _ in new}
+            if {*self.parts[part].settings(self.known())} <= {arm for at, arm in new if at == part}
+        }
+        blocks = [block for (part, _), block in new.items() if part not in older - replaced]
+        if not blocks:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
-        kept = self._with_lists(there)[~there.part.isin(replaced)]
+        added, kept = pd.concat(blocks), self._with_lists(there)[~there.part.isin(replaced)]
         every = pd.concat([kept, added], ignore_index=True) if len(kept) else added
         if replaced:
             order = [*dict.fromkeys([*there.part, *added.part])]
@@ -344,9 +326,9 @@ def _asked(question: Question, known: Any) -> Answer:
         found = question.answer(known)
     except Exception as error:
         why = f"{type(error).__name__}: {error}"
-        raise NoInvestigation(f"the question {question.name!r} fails: {why}") from error
+        raise Refusal(f"the question {question.name!r} fails: {why}") from error
     if not isinstance(found, Answer):
-        raise NoInvestigation(f"the question {question.name!r} gives {found!r} and no `Answer`")
+        raise Refusal(f"the question {question.name!r} gives {found!r} and no `Answer`")
     return found
 
 
@@ -362,21 +344,20 @@ def rounded(value: Any, digits: int | None) -> Any:
 def of_file(path: Path) -> Investigation:
     """The investigation that a Python file defines; published beside it, in `published`.
 
-    Its `registered` is the commit of the file, if Git knows the file as it is. Rows are made again
-    after an edit of the file, unless it is one of comments or docstrings.
+    The commit of the file registers it. Rows are made again after an edit of its code.
     """
     spec = spec_from_file_location(f"investigation_{path.stem}", path)
     if not path.is_file() or spec is None or spec.loader is None:
-        raise NoInvestigation(f"{path} is no Python file")
+        raise Refusal(f"{path} is no Python file")
     module = sys.modules[spec.name] = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise NoInvestigation(f"{path} fails: {type(error).__name__}: {error}") from error
+        raise Refusal(f"{path} fails: {type(error).__name__}: {error}") from error
     cloudpickle.register_pickle_by_value(module)  # workers cannot import it
     found = [one for one in vars(module).values() if isinstance(one, Investigation)]
     if len(found) != 1:
-        raise NoInvestigation(f"{path} must define one Investigation, and defines {len(found)}")
+        raise Refusal(f"{path} must define one Investigation, and defines {len(found)}")
     where = found[0].where or path.parent / "published"
     registered, source = found[0].registered or _commit(path), code(path.read_text("utf-8"))
     return replace(found[0], where=where, registered=registered, source=source)

@@ -1,11 +1,10 @@
 """Runs made on this machine against the published ones, and the proof that an edit changes no bit.
 
 Where code, versions and machine are the published ones, a run must be equal to the last bit.
-Elsewhere rounding differs, and learning may amplify the difference. Then the cost of theta_init
-must agree to `EXACT`, and of `FEWEST` or more runs of one learner, layout and reading of the decay
-at least half must lie in the range of the published runs, widened on both sides by its width and by
-`SLACK`. If none of ten published runs failed and each fails with probability p, most of three fail
-in at most 1.2 % of all cases, whatever p is; a single run fails in 3.5 %.
+Elsewhere the cost of theta_init must agree to `EXACT`, and of `FEWEST` or more runs of one learner,
+layout and reading of the decay at least half must lie in the range of the published runs, widened
+on both sides by its width and by `SLACK`. If none of ten published runs failed and each fails with
+probability p, most of three fail in at most 1.2 % of all cases, whatever p is.
 """
 
 from collections.abc import Iterable, Mapping
@@ -121,10 +120,9 @@ def _overlap(one: Interval, other: Interval) -> bool:
 
 
 def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> Pairs:
-    """The contradictions between verdicts on runs made here and on published runs.
+    """The contradictions between verdicts on runs made here and on the published main table.
 
-    Runs are compared with the published main table in the same layouts and readings of the decay,
-    so that a choice of layouts contradicts nothing. Runs with other fields are skipped.
+    Both are of the same layouts and readings of the decay. Runs with other fields are skipped.
     """
     return contradictions(*_verdicts(fresh, published))
 
@@ -167,7 +165,7 @@ class Agreement:
 
 
 def agreement(fresh: Mapping[Experiment, RunSummary], published: Published) -> Agreement:
-    """How the runs made here agree with the published main table; other runs are skipped."""
+    """The agreement of runs made here with the published main table; other runs are skipped."""
     mine = {e: one for e, one in fresh.items() if published.variants.get(e) == design.MAIN_TABLE}
     pairs = [
         [[float(one[name]) for name in NUMBERS] for one in (row(run), published.rows[e])]
@@ -176,10 +174,6 @@ def agreement(fresh: Mapping[Experiment, RunSummary], published: Published) -> A
     differing = [(here, there) for here, there in pairs if here != there]
     close = sum(np.allclose(*pair, rtol=EXACT, atol=EXACT) for pair in differing)
     return Agreement(len(mine), len(mine) - len(differing), close, *_verdicts(mine, published))
-
-
-class CannotRelock(Refusal):
-    """Runs have changed, or there are none to compare with, so the lock stays as it is."""
 
 
 class Relocked(NamedTuple):
@@ -209,10 +203,9 @@ def _interleaved(groups: Iterable[Iterable[Experiment]]) -> list[Experiment]:
 def relock(known: Published, count: int, *, workers: int | None = None) -> Relocked:
     """Train `count` runs afresh, and write the lock if all have the bits that locked code made.
 
-    In a raised epoch every run is another one: nothing is trained, and the lock is written.
-
     A fresh run is compared with the published run, if such a machine made it, else with the run
-    that is stored here. `CannotRelock` says which bit has changed, or what lacks a comparison.
+    that is stored here. In a raised epoch the lock is written, and nothing is trained. A `Refusal`
+    says which bit has changed, or what lacks a comparison.
     """
     if lock.locked()["epochs"] != provenance.EPOCHS:
         return Relocked(lock.relock(), 0, 0)
@@ -221,7 +214,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     before: dict[Experiment, Row] = {e: known.rows[e] for e in exact}
     before |= {e: row(one) for e in drawn if e not in exact and (one := _stored_by_lock(e))}
     if len(before) < len(drawn):
-        raise CannotRelock(
+        raise Refusal(
             f"only {len(before)} of {len(drawn)} runs can be compared with runs that locked code"
             f" made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
         )
@@ -231,7 +224,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
     if wrong:
         learner, layout, decay, seed, what, now, then = wrong[0]
-        raise CannotRelock(
+        raise Refusal(
             f"{len(wrong)} of {len(drawn)} runs have other bits, first {learner} in layout"
             f" {layout}, decay per {decay}, seed {seed}: {what} is {now!r} and was {then}; if that"
             " is intended, raise the epoch of the package in nmpcrl/study/provenance.py"

@@ -15,6 +15,7 @@ from nmpcrl.analysis.suite import ENTRIES, Judgement, Robot, entry, gain, judge,
 from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
 from nmpcrl.study import Experiment, ParameterError, paper, published, run
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
+from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.robot import NmpcPolicy
 
 LAYOUT, THETA = paper.LAYOUTS["A"], np.array(paper.THETA_INIT)
@@ -155,7 +156,7 @@ def test_an_unknown_entry_a_failing_one_and_a_number_out_of_range_are_refused(
         (tmp_path / f"{module}.py").write_text(text)
         monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((ParameterError, suite.NoEntry), match=message):
+    with pytest.raises(Refusal, match=message):
         judge_all(name, **options)
 
 

@@ -13,7 +13,6 @@ from nmpcrl.analysis import summaries
 from nmpcrl.claims import reproduce
 from nmpcrl.claims.published import Evidence, Published
 from nmpcrl.claims.reproduce import (
-    CannotRelock,
     agreement,
     comparable,
     compare,
@@ -27,6 +26,7 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome,
 from nmpcrl.study import Experiment, design, lock, provenance, sweep
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.refusal import Refusal
 
 HERE = {"machine": fingerprint(), "versions": provenance.environment()}
 ELSEWHERE = HERE | {"machine": fingerprint() | {"processor": "another"}}
@@ -275,6 +275,6 @@ def test_otherwise_the_lock_stays(locked, monkeypatch, stored, times, refusal):
     edit(monkeypatch, times)
     if not stored:
         train_here()  # by code that is not locked
-    with pytest.raises(CannotRelock, match=refusal):
+    with pytest.raises(Refusal, match=refusal):
         relock(KNOWN, 4)
     assert locked.read_text() == before

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from nmpcrl.claims.investigation import NoInvestigation, of_file
+from nmpcrl.claims.investigation import of_file
+from nmpcrl.study.refusal import Refusal
 
 PAGE = Path(__file__).parents[2] / "book" / "your_paper.ipynb"
 
@@ -72,5 +73,5 @@ def test_a_file_that_defines_no_investigation_is_refused(tmp_path, content, said
     path = tmp_path / "wrong.py"
     if content:
         path.write_text(content)
-    with pytest.raises(NoInvestigation, match=said):
+    with pytest.raises(Refusal, match=said):
         of_file(path)
