@@ -54,8 +54,8 @@ def judged(nmpc: Nmpc, theta: Vector, world: World, seed: int = 0) -> Encounters
 def crowding(motions: Sequence[Motion]) -> float:
     """The share of space and time that obstacles cover between start and target.
 
-    The points are a grid of the rectangle from start to target, enlarged by a disc to either side;
-    each at the time of a robot with constant speed along x, five seconds earlier to later.
+    The points are a grid of the rectangle from start to target, enlarged by a disc to either side,
+    each at the time of a robot with constant speed along x, and up to five seconds off.
     """
     low, high = np.sort([paper.START[:2], paper.TARGET[:2]], axis=0)
     xs = np.arange(low[0], high[0], GRID)

@@ -72,10 +72,7 @@ class Curvature:
 
 
 def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
-    """The dropped term h of a run of GES, at so many steps spread evenly over training.
-
-    Steps without a Hessian are skipped.
-    """
+    """The dropped term h of a run of GES, at steps spread evenly over training."""
     steps, gamma = records.steps, paper.GAMMA
     nmpc = controller_of(Experiment(**records.experiment))
     known = np.flatnonzero(np.isfinite(steps["delta"]))[1:]

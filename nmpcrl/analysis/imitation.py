@@ -34,10 +34,7 @@ class Imitation:
 
 
 def imitate(records: Records, *, fits: int = FITS) -> Imitation:
-    """Fit the networks of DES and RDES to one run, and predict its held-out episodes with both.
-
-    Every `HELD_OUT`-th episode is held out. Both networks have the same seed.
-    """
+    """Fit the networks of DES and RDES to one run, and predict its held-out episodes with both."""
     steps = records.steps
     solved = np.isfinite(steps["value"])
     state_action = np.hstack([steps["state"], steps["action"]])[solved]

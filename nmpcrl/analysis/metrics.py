@@ -77,11 +77,10 @@ def late_training_cost(cost: Vector) -> float:
 
 
 def cost_ratio(cost: Vector, frozen: Vector) -> float:
-    """`late_training_cost` of a run over that of the frozen learner, from their `training_cost`.
+    """`late_training_cost` of a run over that of the frozen learner under the same noise.
 
-    The frozen learner has the same seed, layout and decay, and so the same noise. The ratio is
-    infinite if the run alone lost half of its late episodes, 0 if the frozen learner alone did, nan
-    (not known) if both did.
+    The ratio is infinite if the run alone lost half of its late episodes, 0 if the frozen learner
+    alone did, nan if both did.
     """
     return late_training_cost(cost) / late_training_cost(frozen)
 

@@ -1,8 +1,7 @@
 """Searches for theta by the costs of rollouts without noise.
 
 A direct search calls `cost` at most `budget` times, first with the start, and returns the theta of
-least cost; its result depends on the seed alone. `search` is one CMA-ES in a layout, longer than
-any learner's budget: a lower bound of the possible gain.
+least cost. `search` is one long CMA-ES in a layout: a lower bound of the possible gain.
 """
 
 from bisect import bisect
@@ -37,7 +36,7 @@ class Tried:
     lower, upper = LOWER / SCALE, UPPER / SCALE
 
     def __init__(self, cost: Cost, start: Vector, budget: int) -> None:
-        """Make the first rollout; ValueError for a budget below 1."""
+        """Make the first rollout."""
         if budget < 1:
             raise ValueError(f"budget = {budget} must be at least 1 rollout")
         self._cost, self._budget = cost, budget
@@ -98,9 +97,8 @@ def spsa(
     """Simultaneous perturbation: two rollouts an iteration, `perturbed` on either side of theta.
 
     g = (y+ - y-) / (2 c_k) sign, theta <- theta - a_k g, with a_k = a / (k + 1 + A)^0.602 and
-    c_k = perturbed / (k + 1)^0.101; `a` is such that the first step is `step` long in each
-    component; no later one is longer. The last rollout of an even budget judges the last theta.
-    Source: Spall (1998).
+    c_k = perturbed / (k + 1)^0.101; the first step is `step` long in each component, and no later
+    one is longer. The last rollout of an even budget judges the last theta. Source: Spall (1998).
     """
     tried, rng = Tried(cost, start, budget), np.random.default_rng(seed)
     point, delay, a, k = np.asarray(start, float) / SCALE, budget / 20, 0.0, 0

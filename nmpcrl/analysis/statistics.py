@@ -2,10 +2,8 @@
 
 Scores have the interquartile mean and the probability of improvement of Agarwal et al. (2021), with
 a percentile bootstrap that draws within each stratum, here a layout: the interval is one over runs
-in these layouts. Rates have Wilson's (1927) interval, which has a width even if all runs agree.
-
-A failed rollout has infinite cost: it is worse than any arrival and ties with another failure. A
-score that is nan is refused.
+in these layouts. Rates have Wilson's (1927) interval. A failed rollout has infinite cost; a score
+that is nan is refused.
 """
 
 from collections.abc import Callable, Hashable, Sequence
@@ -43,8 +41,7 @@ def rate(yes: int, of: int) -> Estimate:
     """The share of independent runs that answer yes, with Wilson's interval.
 
     For several layouts the interval is too wide rather than too narrow: a fixed number of runs in
-    each varies less than as many runs drawn from the mixture (Hoeffding 1956). Runs of one seed,
-    which have the same noise in every layout, are treated as independent.
+    each varies less than as many runs drawn from the mixture (Hoeffding 1956).
     """
     if not 0 <= yes <= of or not of:
         raise ValueError(f"{yes} of {of} runs is not a rate")
@@ -62,10 +59,7 @@ def paired_p(gained: int, lost: int) -> float:
 
 
 def interquartile_mean(scores: Vector, strata: Sequence[Hashable]) -> Estimate:
-    """Mean of the middle half of the scores; infinite if more than a quarter of the runs failed.
-
-    `scores` and `strata`, the layouts, have one entry a run.
-    """
+    """Mean of the middle half of the scores; infinite if more than a quarter of the runs failed."""
     known = _known(scores)
 
     def middle(*drawn: Vector) -> Any:
@@ -80,11 +74,8 @@ def probability_of_improvement(
     """Probability that a run of the first learner costs less than one of the second.
 
     Within a layout every run of the first is compared with every run of the second; a tie counts
-    one half (Mann and Whitney's U). Layouts have equal weights. Runs of one seed have the same
-    noise, so the bootstrap draws them together.
-
-    `first`, `second` and `strata`, the layouts, have one entry a pair of runs with the same layout,
-    decay and seed.
+    one half (Mann and Whitney's U). Layouts have equal weights. The arguments have one entry a pair
+    of runs of one layout and seed, which have the same noise: the bootstrap draws them together.
     """
     ours, theirs = _known(first), _known(second)
     if len(ours) != len(theirs):
@@ -101,10 +92,9 @@ def probability_of_improvement(
 
 
 def over_layouts(statistic: Callable[..., Any], *columns: Vector) -> Estimate:
-    """A statistic of columns, each of shape (layouts,), and its percentile interval.
+    """A statistic over the last axis of columns of shape (layouts,), and its percentile interval.
 
-    The statistic is over the last axis of the columns. A draw in which it is nan or infinite does
-    not count.
+    Draws in which it is nan or infinite do not count.
     """
     rows = np.stack(columns)
     count, rng = rows.shape[1], np.random.default_rng(SEED)
@@ -127,8 +117,7 @@ def _known(scores: Vector) -> Vector:
 def _bootstrapped(statistic: Callable[..., Any], strata: Sequence[Hashable]) -> Estimate:
     """The statistic of all runs, and its percentile interval under draws within each stratum.
 
-    The statistic is of the indices of the runs of each stratum, each of shape (..., runs in it).
-    With a single run in a stratum the bounds are nan.
+    It is of the indices of the runs of each stratum; with a single run in one the bounds are nan.
     """
     codes, names = pd.factorize(pd.Series(list(strata)))
     members = [np.flatnonzero(codes == code) for code in range(len(names))]

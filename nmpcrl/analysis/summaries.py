@@ -14,8 +14,7 @@ FOLDER = "summaries"  # among the runs
 def make(experiment: Experiment, *, afresh: bool = False) -> RunSummary:
     """The summary of a run, which is trained if it is not stored, or if `afresh` holds.
 
-    Raises:
-        Refusal: the run needs another solver than its experiment names.
+    A run that needs another solver than its experiment names is refused.
     """
     if experiment.solver == Riccati.name:
         need_numba("without it riccati solves nothing")

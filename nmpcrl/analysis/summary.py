@@ -1,7 +1,6 @@
 """Summaries of runs: tables by episode and by rollout instead of by step.
 
-The records of a run take megabytes, and the run is trained again in seconds; a summary takes a
-hundredth of that and is enough for every figure and verdict of the study.
+A summary takes a hundredth of the records, and is enough for every verdict of the study.
 """
 
 from collections.abc import Callable, Mapping

@@ -1,8 +1,7 @@
 """The trap: the robot stands before a closed gap, and learning closes the gap further.
 
 A standing robot pays the stage cost l at every step, l / (1 - gamma) in all. Its plan expects to
-arrive or to pass the gap and costs less: delta = l + gamma V - V is above 0. A step along phi
-raises V and with it theta_c. The value gets more accurate while the policy gets worse.
+arrive and costs less: delta = l + gamma V - V is above 0. A step along phi raises V and theta_c.
 """
 
 from collections.abc import Callable, Iterable
@@ -106,11 +105,9 @@ def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
 def ending(summary: RunSummary) -> dict[str, float]:
     """The end of a run's last rollout without noise, and the TD errors on the way.
 
-    Returns:
-        moved (way [m] in the last `STOOD` steps), worth (V over l / (1 - gamma) at the end),
-        delta_first and delta_last (root mean square over the first and the last `PART` episodes)
-        and phi_c (slope of V in theta_c at the end). moved, worth and phi_c are nan where the
-        robot arrived or a solve failed.
+    moved (way [m] in the last `STOOD` steps), worth (V over l / (1 - gamma) at the end) and phi_c
+    (slope of V in theta_c at the end), which are nan where the robot arrived or a solve failed;
+    delta_first and delta_last (root mean square over the first and the last `PART` episodes).
     """
     delta = summary.episodes["delta"]
     reached = delta[np.isfinite(delta)]

@@ -13,10 +13,8 @@ from nmpcrl.study.records import Records, Stopped
 def evaluations(runs: Iterable[Records]) -> pd.DataFrame:
     """Every rollout without noise of some runs, such as the values of `fetch_all`.
 
-    A run that diverges has no policy: its last row has an infinite cost.
-
-    Returns:
-        Columns learner, seed, episode, cost (summed, without noise) and theta.
+    Columns learner, seed, episode, cost and theta. The last cost of a run that diverges is
+    infinite: it has no policy.
     """
     rows = list[dict[str, Any]]()
     for run in runs:
@@ -36,23 +34,16 @@ def final_costs(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def summarise(costs: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """Each learner's interquartile mean, and its probability to cost less than the baseline.
+    """Each learner's "interquartile mean" of `final_costs`, and "P(costs less)" than the baseline.
 
-    Args:
-        costs: of `final_costs`; the seeds are one stratum.
-        baseline: the learner that the others are compared with.
-
-    Returns:
-        One row for each learner and an `Estimate` in each column: "interquartile mean" and
-        "P(costs less)".
+    Each is an `Estimate`; the seeds are one stratum.
     """
-    strata = ["all"] * len(costs)
-    return pd.DataFrame(
-        {
-            "interquartile mean": interquartile_mean(costs[name].to_numpy(), strata),
-            "P(costs less)": probability_of_improvement(
-                costs[name].to_numpy(), costs[baseline].to_numpy(), strata
-            ),
+    strata, than = ["all"] * len(costs), costs[baseline].to_numpy()
+    rows = {
+        name: {
+            "interquartile mean": interquartile_mean(cost.to_numpy(), strata),
+            "P(costs less)": probability_of_improvement(cost.to_numpy(), than, strata),
         }
-        for name in costs
-    ).set_axis(pd.Index(costs.columns, name="learner"))
+        for name, cost in costs.items()
+    }
+    return pd.DataFrame.from_dict(rows, "index").rename_axis("learner")

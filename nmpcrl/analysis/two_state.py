@@ -67,8 +67,7 @@ def follow(
 ) -> Matrix:
     """(theta, w) before the first update, (1, 0), and after each, shape (updates + 1, 2).
 
-    The rule is one of `nmpcrl.learning`, such as `semi_gradient(alpha)`. `rng` draws the state of
-    each update; without it updates are expected ones.
+    `rng` draws the state of each update; without it updates are expected ones.
     """
     path = [Weights(np.ones(1), np.zeros(1))]
     for _ in range(updates):

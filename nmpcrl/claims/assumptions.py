@@ -1,9 +1,7 @@
 """The assumptions of the theorems that are cited for convergence, beside the algorithm: claim C8.
 
-The paper's sentence cites Maei et al. (2010), whose values are linear in theta, as the paper says
-itself two equations earlier. Its introduction credits that work with what Maei et al. (2009) prove,
-for smooth values that need not be linear. So C8 asks about both. An assumption is listed for a
-theorem where the paper, or the public part of the work, states it.
+The paper cites Maei et al. (2010), for values that are linear in theta. Its introduction credits
+that work with what Maei et al. (2009) prove for smooth values. So C8 asks about both theorems.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""The runs that a chapter rests on: published ones, or runs trained here.
-
-The book shows the published study. A reader who asks for other runs gets those, and every figure
-names the origin of its runs. `reproduce.agreement` compares runs made again with published ones.
-"""
+"""The runs that a chapter rests on: published ones, or runs trained here."""
 
 from dataclasses import replace
 from typing import Any
@@ -26,11 +22,9 @@ SOURCES = ("published", "fresh")
 
 
 def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
-    """The runs of the main table to train here, and the run with theta frozen beside each.
+    """The runs of `design.main_table` to train here, and the run with theta frozen beside each.
 
-    Args:
-        source: "fresh" for all runs, "published" for the runs that are not published.
-        asked: learners, layouts, seeds and episodes, as `design.main_table` takes them.
+    The source is "fresh" for all runs, or "published" for the runs that are not published.
     """
     one_of(SOURCES).check("study", source)
     runs, known = _asked(**asked), load().summaries
@@ -47,10 +41,7 @@ def repeatable(repeat: bool, **asked: Any) -> tuple[Experiment, ...]:
 def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
     """The runs of a chapter; runs of `needed` are trained if they are not stored.
 
-    Args:
-        source: "published" or "fresh".
-        variants: whether to add the published controls and variants.
-        asked: as for `needed`.
+    With `variants` the published controls and variants are added.
     """
     runs, known = dict.fromkeys(_asked(**asked), design.MAIN_TABLE), load()
     parts = {e: part for e, part in known.variants.items() if part != design.MAIN_TABLE}

@@ -4,8 +4,7 @@ A run went wrong if it was stopped or diverged in training (`thresholds.divergen
 final noise-free cost is above theta_init's by more than `BETTER`. Its cost rose between the last
 rollout without noise at or below that border and the first above it; without such a rollout, in its
 last episodes. In these some ten episodes the mechanisms are looked for in the order of `Mechanism`,
-and the first one found counts, because each can bring about the later ones. A summary cannot tell
-which came first within these episodes.
+and the first one found counts, because each can bring about the later ones.
 
 The thresholds were fixed before they were applied to the study, but after a look at the ranges of
 these columns in five short runs. They sort runs, and decide no claim.
@@ -68,17 +67,11 @@ def failure_modes(
     runs: pd.DataFrame,
     every: Mapping[Experiment, RunSummary],
 ) -> pd.DataFrame:
-    """The failure mode of each run, one row a run, in order.
+    """The failure mode of each run, one row a run, in order; empty where theta is frozen.
 
-    Args:
-        summaries: the runs.
-        runs: their table, of `rows.table`.
-        every: runs that include the `frozen_arm` of each, trained here or published.
-
-    Returns:
-        Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
-        `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
-        well); empty where theta is frozen.
+    Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
+    `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
+    well). `runs` is the `rows.table` of the summaries; `every` includes the `frozen_arm` of each.
     """
     rows = []
     for (e, run), wrong in zip(summaries.items(), went_wrong(runs), strict=True):

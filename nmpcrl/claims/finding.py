@@ -1,8 +1,7 @@
 """The main finding in a few numbers: closed gaps, theta_c by hand, and the endings of RDES.
 
-theta_c tightens the obstacle constraint, Eq. (2f). A gap that the first rollout goes through closes
-at a theta_c that is known before training (`trajectory.closes_at`). Runs of ES and GES are sorted
-by their final theta_c, which is known only after training.
+A gap that the first rollout goes through closes at a theta_c that is known before training
+(`trajectory.closes_at`); the final theta_c of a run of ES or GES only after training.
 """
 
 from collections.abc import Mapping

@@ -26,8 +26,8 @@ def compared(
 ) -> dict[str, Any]:
     """The fields of a claim that compares the final noise-free costs of two learners.
 
-    The numbers are the cost of the first minus the second's, in shares of theta_init's, in the
-    cells of the learner that is not the paper's; `size` is applied to them.
+    The numbers are `size` of the cost of the first minus the second's, in shares of theta_init's,
+    in the cells of the learner that is not the paper's.
     """
     first, second = learners
     ours = tuple(name for name in learners if name not in PAPER)
@@ -56,8 +56,7 @@ def _numbers(runs: pd.DataFrame, _: Paths, learners: tuple[str, ...]) -> dict[st
 def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     """Probability that a run of the first learner costs less than one of the second in its layout.
 
-    Every pair counts alike: a run that got stuck loses once, by however much. Runs without a
-    counterpart do not count; without any pair the estimate is nan.
+    Runs without a counterpart do not count; without any pair the estimate is nan.
     """
     one, other = _pairs(runs, first, second)
     if one.empty:

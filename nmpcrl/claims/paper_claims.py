@@ -13,29 +13,11 @@ import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import EVAL_INSIDE, INSIDE, THETA, experiment_of
+from nmpcrl.claims import thresholds
 from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values
 from nmpcrl.claims.rule import Claim, Paths, arms, counted, median
-from nmpcrl.claims.thresholds import (
-    BETTER,
-    DIVERGED,
-    HALF,
-    MORE_ACCURATE,
-    NEAR_HALF,
-    NEAR_SAME_TIME,
-    SAME_COST,
-    SAME_PATH,
-    SAME_TIME,
-    UNSTABLE,
-    cost_difference,
-    cost_reduction,
-    divergence,
-    instability,
-    late_cost_range,
-    path_distance,
-    training_cost_ratio,
-    was_stopped,
-)
+from nmpcrl.claims.thresholds import HALF, NEAR_HALF, NEAR_SAME_TIME, SAME_TIME
 from nmpcrl.claims.timing import TimeClaim
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.study.experiment import PAPER
@@ -67,20 +49,20 @@ def _contrasted(
 def policy_distances(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The distance between the policies of RDES and GES, a row a cell.
 
-    Returns:
-        Columns path [m] (nan where a rollout failed) and cost (in shares of theta_init's), failed
-        (whether RDES's did: two that failed have the same cost and are not the same), and known
-        (whether both runs and both paths are known).
+    Columns path [m] (nan where a rollout failed) and cost (in shares of theta_init's), failed
+    (whether RDES's did: two that failed have the same cost and are not the same), and known
+    (whether both runs and both paths are known).
     """
     asked = runs[runs.learner.isin(("RDES", "GES"))]
     found = [paths.get(experiment_of(row)) for row in asked.to_dict("records")]
     rdes, ges = arms(asked.assign(path=pd.Series(found, asked.index, object)), "RDES", "GES")
     known = rdes.path.notna() & ges.path.notna()
-    apart = [path_distance(*pair) for pair in zip(rdes.path[known], ges.path[known], strict=True)]
+    pairs = zip(rdes.path[known], ges.path[known], strict=True)
+    apart = [thresholds.path_distance(*pair) for pair in pairs]
     return pd.DataFrame(
         {
             "path": pd.Series(apart, rdes.index[known], dtype=float).reindex(rdes.index),
-            "cost": cost_difference(rdes, ges).abs(),
+            "cost": thresholds.cost_difference(rdes, ges).abs(),
             "failed": np.isinf(rdes.final_cost),
             "known": known & rdes.stopped.notna() & ges.stopped.notna(),
         }
@@ -90,7 +72,8 @@ def policy_distances(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 def _policy_distance(runs: pd.DataFrame, paths: Paths) -> Values:
     """The distance in path or in cost, the larger one, in units of what counts as the same."""
     apart = policy_distances(runs, paths)
-    worse = np.maximum(apart.path / SAME_PATH, apart.cost / SAME_COST).fillna(np.inf)
+    path, cost = apart.path / thresholds.SAME_PATH, apart.cost / thresholds.SAME_COST
+    worse = np.maximum(path, cost).fillna(np.inf)
     return worse.mask(apart.failed, np.inf).where(apart.known).to_frame("RDES and GES")
 
 
@@ -126,14 +109,13 @@ def _c7_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
 def kept_without_noise(runs: pd.DataFrame, learners: Learners) -> pd.DataFrame:
     """The answers of each run to the weaker question of C7, or of W7 with its learners.
 
-    Returns:
-        Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether
-        training was stopped: then only the rollouts before are asked).
+    Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether
+    training was stopped: then only the rollouts before are asked).
     """
     every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
     c7 = replace(BY_RUNS["C7"], learners=learners)
     kept = c7.answers(c7.measure(runs, {}))
-    stopped = was_stopped(every).reorder_levels(kept.index.names)
+    stopped = thresholds.was_stopped(every).reorder_levels(kept.index.names)
     return pd.DataFrame({"kept": kept, "stopped": stopped.reindex(kept.index)})
 
 
@@ -141,7 +123,7 @@ def _c9_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
     every = zip(PAPER, arms(runs, *PAPER), strict=True)
     claimed = pd.concat(arms(runs, *learners))
     return {
-        "medians": {name: median(cost_reduction(arm)) for name, arm in every},
+        "medians": {name: median(thresholds.cost_reduction(arm)) for name, arm in every},
         "failed": int(np.isinf(claimed.final_cost).sum()),
         "stuck": int((claimed.distance > ARRIVED).sum()),
     }
@@ -159,15 +141,15 @@ CLAIMS: dict[str, Claim] = {
             question="Did DES diverge, and RDES with the same layout, decay and seed not?",
             measured="whether the run was stopped; median training cost of the last 20 episodes"
             " over that of the frozen arm under the same noise",
-            border=f"diverged: stopped, or above {DIVERGED}",
+            border=f"diverged: stopped, or above {thresholds.DIVERGED}",
             would_change="Other layouts and the untold details of the network; Algorithm 1 read"
             " literally (departure G).",
             learners=("DES", "RDES"),
-            number=training_cost_ratio,
-            threshold=DIVERGED,
+            number=thresholds.training_cost_ratio,
+            threshold=thresholds.DIVERGED,
             wrong="diverged",
             worst="had to be stopped",
-            numbers=partial(_contrasted, divergence, "cost_ratio"),
+            numbers=partial(_contrasted, thresholds.divergence, "cost_ratio"),
             nothing=1.0,
             label="training cost / frozen arm's",
             borders=np.geomspace(1.02, 15, UP_TO),
@@ -181,15 +163,15 @@ CLAIMS: dict[str, Claim] = {
             question="Was ES unstable, and GES with the same layout, decay and seed not?",
             measured="as C1; range of the noise-free cost in the second half of training, as a"
             " share of theta_init's",
-            border=f"unstable: diverged, or above {UNSTABLE:.0%}",
+            border=f"unstable: diverged, or above {thresholds.UNSTABLE:.0%}",
             would_change="A larger step size: alpha ||phi||^2 decides where a semi-gradient step"
             " overshoots.",
             learners=("ES", "GES"),
-            number=late_cost_range,
-            threshold=UNSTABLE,
+            number=thresholds.late_cost_range,
+            threshold=thresholds.UNSTABLE,
             wrong="was unstable",
             worst="diverged",
-            numbers=partial(_contrasted, instability, "late_cost_range"),
+            numbers=partial(_contrasted, thresholds.instability, "late_cost_range"),
             label="range of noise-free cost",
             borders=np.geomspace(0.005, 1.5, UP_TO),
         ),
@@ -233,7 +215,7 @@ CLAIMS: dict[str, Claim] = {
             measured="largest distance of their trajectories without noise; difference of the final"
             " noise-free costs, as a share of theta_init's (theta itself is compared, but not"
             " judged: two of them may act alike)",
-            border=f"at most {SAME_PATH} m and at most {SAME_COST:.0%}",
+            border=f"at most {thresholds.SAME_PATH} m and at most {thresholds.SAME_COST:.0%}",
             would_change="A looser meaning of 'same', and longer training.",
             learners=("RDES", "GES"),
             values=_policy_distance,
@@ -253,13 +235,13 @@ CLAIMS: dict[str, Claim] = {
             " err less?",
             measured="root mean square errors on held-out pairs of state and theta, with over"
             " without",
-            border=f"at most {MORE_ACCURATE}",
+            border=f"at most {thresholds.MORE_ACCURATE}",
             would_change="How far theta moves: where it hardly does, the network gains nothing from"
             " it.",
             learners=("RDES",),
             number=lambda rdes: rdes.imitation_with / rdes.imitation_without,
             among=PAPER,
-            threshold=MORE_ACCURATE,
+            threshold=thresholds.MORE_ACCURATE,
             numbers=_c6_numbers,
             unit="runs",
             nothing=1.0,
@@ -311,20 +293,20 @@ CLAIMS: dict[str, Claim] = {
             question="Does the run of RDES, or of GES, end with a lower noise-free cost than"
             " theta_init's?",
             measured="share of theta_init's noise-free cost that the last three rollouts save",
-            border=f"at least {BETTER:.0%}",
+            border=f"at least {thresholds.BETTER:.0%}",
             would_change="The layout, and theta_c: near d_o it removes the penalty altogether"
             " (departure N).",
             quotation="“an RL algorithm can advantageously adjust the parameters of the NMPC […] to"
             " enhance closed-loop performance” (Section II-B); no figure shows the performance"
             " without learning",
             implied=True,
-            threshold=BETTER,
+            threshold=thresholds.BETTER,
             unit="runs",
             label="fall of noise-free cost",
             linear_to=0.1,
             borders=np.linspace(-0.05, 0.15, UP_TO),
             learners=("RDES", "GES"),
-            number=cost_reduction,
+            number=thresholds.cost_reduction,
             numbers=_c9_numbers,
         ),
     )

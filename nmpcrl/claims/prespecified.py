@@ -1,8 +1,7 @@
 """The commit that fixed the thresholds and the rule, and the definitions that came later.
 
-Every state of the code since that commit has the same `NUMBERS`, by name and value. The manifest of
-the published data names the commit, and a test compares it with git. `decided_since.csv` lists
-later definitions. The manifest also names the commit of the questions of each investigation.
+The manifest of the published data names the commit; a test compares `NUMBERS` with those of every
+state of the code since. `decided_since.csv` lists later definitions.
 """
 
 from collections.abc import Mapping
@@ -26,10 +25,7 @@ NUMBERS = {name: getattr(home, name) for home, names in MODULES.items() for name
 def fixed(about: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Hash and date (UTC) of two commits: "thresholds" fixed, and first runs "published".
 
-    Empty if the manifest has other numbers than the code.
-
-    Args:
-        about: of `published.load()`.
+    `about` is that of `published.load()`. Empty if the manifest has other numbers than the code.
     """
     known = {**about.get("fixed", {})}
     today = {name: list(one) if isinstance(one, tuple) else one for name, one in NUMBERS.items()}

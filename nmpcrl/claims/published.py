@@ -93,12 +93,9 @@ class Evidence:
     def joined(
         self, fresh: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
     ) -> "Evidence":
-        """These runs and fresh ones.
+        """These runs and fresh ones, trained here, which replace runs of the same name.
 
-        Args:
-            fresh: runs that were trained here; they replace runs of the same name. The run with
-                theta frozen beside each must be among these or those.
-            variants: the part of the study that each belongs to.
+        `variants` name the part of the study of each fresh run.
         """
         if not fresh:
             return self
@@ -117,10 +114,9 @@ class Evidence:
     @property
     def mark(self) -> str:
         """How many runs were trained here and how many are published, for a caption."""
-        fresh = int((self.runs.source == "fresh").sum())
-        counts = {"trained for this page": fresh, "published": len(self.runs) - fresh}
-        parts = [f"{count} runs {where}" for where, count in counts.items() if count]
-        return ", ".join(parts) or "no runs"
+        names = {"fresh": "trained for this page", "published": "published"}
+        counts = {name: int((self.runs.source == source).sum()) for source, name in names.items()}
+        return ", ".join(f"{n} runs {name}" for name, n in counts.items() if n) or "no runs"
 
     @property
     def origin(self) -> str:

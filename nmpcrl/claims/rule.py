@@ -32,15 +32,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, over_layouts, rate
-from nmpcrl.claims.verdict import (
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    UNDECIDABLE,
-    Assumption,
-    Outcome,
-    Verdict,
-)
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Outcome, Verdict
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column, Stopped
@@ -164,11 +156,8 @@ def settle(
 ) -> Verdict:
     """The verdict on a claim, overall, in each layout and in each reading of the decay.
 
-    Args:
-        claim: the claim.
-        answers: True, False or missing, indexed by layout, decay, seed or by other levels.
-        weaker: answers to a weaker question, which a yes to the first implies.
-        unit: the name of what answers, in the plural.
+    Answers are True, False or missing, indexed by layout, decay, seed or by other levels; `weaker`
+    are those to a weaker question, which a yes to the first implies.
     """
     names = [*map(str, answers.index.names)]
     lenient = answers if weaker is None else weaker
@@ -203,8 +192,7 @@ def drawn_anew(values: Iterable[float]) -> Estimate:
     """The mean of one value a layout, with the interval of 95 % for layouts drawn anew.
 
     The bootstrap draws layouts. Where all values are 0, or all 1, it would have no width, and the
-    interval is Wilson's of as many layouts. Below `FEWEST_LAYOUTS` the bounds are nan. Six layouts
-    are few for a bootstrap: the interval is, if anything, too narrow.
+    interval is Wilson's of as many layouts. Below `FEWEST_LAYOUTS` the bounds are nan.
     """
     known = np.array([*values], float)
     value = float(known.mean()) if known.size else np.nan
@@ -227,12 +215,9 @@ def arms(
     """The runs of each learner, in the same order of layout, decay and seed.
 
     A run that is missing, or shorter than the paper's, is a row of nan. One that was stopped left
-    no policy, so its final cost is infinite, whatever the last rollout cost.
-
-    Args:
-        runs: of `rows.table`, all of one setting; a ValueError says if not.
-        learners: whose runs are returned.
-        among: the learners whose cells are covered; by default `learners`.
+    no policy, so its final cost is infinite, whatever the last rollout cost. `runs` are of
+    `rows.table`, all of one setting. The cells are those of the learners in `among`, by default of
+    `learners`.
     """
     asked = runs[runs.learner.isin(among or learners)]
     cells = pd.MultiIndex.from_frame(asked[CELL].drop_duplicates())

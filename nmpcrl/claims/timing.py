@@ -8,9 +8,9 @@ The interval of the ratio (`bench.paired`) decides, and must lie on one side of 
 - not decidable: it reaches across a border, too few steps were timed, or the process waited for
   more than `WAITED` of the time.
 
-All was fixed before any ratio was judged. `WAITED` = 3/4 is where four share a processor. To fill
-the caches again takes up to 0.1 ms (a megabyte at 10 GB/s) in a turn of 1 ms or more: up to a tenth
-of the time, as much as C4 leaves between its claim and its border.
+All was fixed before any ratio was judged. `WAITED` = 3/4 is where four share a processor: then to
+fill the caches again takes up to a tenth of the time, as much as C4 leaves between its claim and
+its border.
 """
 
 from dataclasses import dataclass

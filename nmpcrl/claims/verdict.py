@@ -37,11 +37,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class Halves:
-    """How many runs of two learners went wrong, in one reading of the decay.
-
-    One share of pairs cannot tell which half of "DES diverges and RDES does not" fails. Only pairs
-    in which one of the two went wrong, and the other did not, tell the learners apart.
-    """
+    """How many runs of two learners went wrong, in one reading of the decay."""
 
     learners: tuple[str, str]  # by the claim the first goes wrong, and the second does not
     wrong: str  # how: "diverged"

@@ -15,11 +15,11 @@ from nmpcrl.studies import remedies
 from nmpcrl.studies.agents import (
     AGENTS,
     PARTS,
+    SAC_AND_TD3,
     SEARCH,
     SEARCHED,
     SETTINGS,
     Course,
-    answers,
     course,
     rows,
     searched,
@@ -69,7 +69,7 @@ def waiting(table: pd.DataFrame) -> str:
 
 def finding(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """What each agent costs after the budget that others have, and the search; "" if unknown."""
-    judged, by = _courses(table, "judge"), answers(table, suite)
+    judged, by = _courses(table, "judge"), SAC_AND_TD3.judge((table, suite))
     if not judged:
         return ""
     costs = [f"{_median(one)} times as much ({one.agent})" for one in judged]
@@ -110,7 +110,7 @@ def row_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
 def in_short(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """The same in a sentence."""
     judged = _courses(table, "judge")
-    return f"{_head(judged, answers(table, suite))}." if judged else waiting(table)
+    return f"{_head(judged, SAC_AND_TD3.judge((table, suite)))}." if judged else waiting(table)
 
 
 def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
@@ -120,7 +120,7 @@ def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
         table: of `studies.agents`.
         suite: the published comparison of remedies.
     """
-    by, one, seen, new = answers(table, suite), PARTS["one"], len(TUNE), len(JUDGE)
+    by, one, seen, new = SAC_AND_TD3.judge((table, suite)), PARTS["one"], len(TUNE), len(JUDGE)
     asked: dict[str, tuple[str, Sequence[str], str]] = {  # where: part, layouts, in a question
         f"for layout A, {one.seeds} seeds": ("one", (), "in one layout"),
         f"for {seen} layouts, in these": ("all", [*TUNE], f"over the {seen}"),

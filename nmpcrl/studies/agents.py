@@ -3,9 +3,9 @@
 Settings, parts and questions were committed before any agent was tuned or judged; a test compares
 them with that commit, whose file also says what each question measures and where yes ends.
 
-An agent has four settings, tuned in three layouts; the one with the least mean of J / J_init is
-judged. It **matches** theta_init where its rollout without noise costs no more, and **solves** a
-layout where it also ends at the target. A training costs most of an hour or less of one core.
+Of four settings of an agent, the one with the least mean of J / J_init in three layouts is judged.
+It **matches** theta_init where its rollout without noise costs no more, and **solves** a layout
+where it also ends at the target.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -141,10 +141,7 @@ class Course:
 
 
 def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()) -> Course:
-    """The course of an agent in a part of `SAC_AND_TD3`; without columns where no run is known.
-
-    `among` are the layouts to look at, of an agent for all.
-    """
+    """The course of an agent in a part, in all layouts or `among` some; empty without runs."""
     points = CHECKPOINTS[part]
     shares, there = [pd.DataFrame(index=points)], [pd.DataFrame(index=points)]
     for run in table[(table.part == part) & table.arm.str.startswith(agent)].itertuples():
@@ -226,11 +223,6 @@ QUESTIONS = (
         "SAC or TD3", "Does SAC cost less than TD3 with 300 episodes each?", PARTLY, _one_or_other
     ),
 )
-
-
-def answers(table: pd.DataFrame, compared: pd.DataFrame) -> dict[str, Answer]:
-    """The answers beside a comparison of remedies, by the names of the questions."""
-    return SAC_AND_TD3.judge((table, compared))
 
 
 def searched(compared: pd.DataFrame, part: str) -> pd.Series:

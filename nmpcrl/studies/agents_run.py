@@ -1,8 +1,7 @@
 """SAC and TD3 of stable-baselines3 on `nmpcrl/Robot-v0`: learners without an NMPC.
 
 An agent observes the state of the robot, its target and the centres of the obstacles, and after
-each step the cost. It has no model: neither of the robot nor of the cost, nor the size of an
-obstacle. `pip install nmpcrl[agents]` brings stable-baselines3.
+each step the cost. It knows no model, nor the size of an obstacle.
 """
 
 import importlib
@@ -56,9 +55,8 @@ def judged_in(place: str) -> Mapping[str, Centres]:
 def curve(checkpoints: Sequence[int], agent: Entry, place: str, episodes: int, seed: int) -> Row:
     """Train an agent, and judge it without noise at each checkpoint.
 
-    Returns:
-        initial, the cost of theta_init in each layout of `judged_in`; costs and arrived (a letter a
-        layout) at each checkpoint; episodes and steps of the robot.
+    The row has the cost of theta_init in each layout of `judged_in`; costs and arrived (a letter a
+    layout) at each checkpoint; episodes and steps of the robot.
     """
     robots = [Robot(centres, 1 + len(checkpoints), seed) for centres in judged_in(place).values()]
     initial = [robot.cost(THETA) for robot in robots]
@@ -96,15 +94,10 @@ def trained(
     name: str, env: Any, layouts: Sequence[Centres], checkpoints: Sequence[int], seed: int,
     **settings: float,
 ) -> Iterator[Checkpoint]:  # fmt: skip
-    """Train SAC or TD3, and yield it at each checkpoint.
+    """Train SAC or TD3 on `nmpcrl/Robot-v0`, and yield it at each checkpoint.
 
-    Args:
-        name: "SAC" or "TD3".
-        env: `nmpcrl/Robot-v0`, in which no other code makes steps.
-        layouts: one is drawn for each episode.
-        checkpoints: episodes, rising.
-        seed: of all draws.
-        settings: values for all of `_DEFAULTS`.
+    A layout is drawn for each episode. Checkpoints are numbers of episodes, rising; settings are
+    values for all of `_DEFAULTS`. No other code makes steps in the environment.
     """
     scaled, state = _Scaled(env, layouts, settings), list[Any]()
     with _drawing_from(state):

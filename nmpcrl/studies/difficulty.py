@@ -1,15 +1,14 @@
 """Measures of a layout before training, which may predict success: an investigation of its own.
 
 The first five are the measures by which BARN orders its maps (Perille et al. 2020, "Benchmarking
-Metric Ground Navigation"), written anew from their definitions. BARN counts cells of a grid along
-its shortest path, and averages over the path. Here
+Metric Ground Navigation"). BARN counts cells of a grid along its shortest path, and averages over
+the path. Here
 
 - obstacles are discs and walls are lines, so that distances are exact and not numbers of cells; a
-  disc is as wide as plans at theta_c = 0 keep, which is the configuration space of the robot;
+  disc is as wide as plans at theta_c = 0 keep;
 - the path is the first trajectory of the controller, without noise, from theta_init, up to where
-  the robot has arrived and no further; its points are `SPACING` apart;
-- a point within a disc is at distance 0 from it and sees nothing;
-- every direction ends at a wall, so that none has to be left out.
+  the robot has arrived; its points are `SPACING` apart;
+- a point within a disc is at distance 0 from it and sees nothing.
 """
 
 import numpy as np
@@ -86,7 +85,7 @@ def barn(path: Matrix, task: Task) -> dict[str, float]:
 def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
     """The least theta_c of a grid at which the robot does not arrive, all else as theta_init.
 
-    Nothing is learned. nan where it arrives on the whole grid.
+    nan where it arrives on the whole grid.
     """
     task = paper.task(centres)
     controller, theta = paper.controller(task, horizon=horizon), [*paper.THETA_INIT]
@@ -114,10 +113,7 @@ def clearance(points: Matrix, task: Task) -> Vector:
 
 
 def sight(points: Matrix, directions: int, task: Task) -> Matrix:
-    """Distance [m] from points, shape (k, 2), to the first disc or wall in each direction.
-
-    The directions go around, beginning with that of x.
-    """
+    """Distance [m] from points, shape (k, 2), to the first disc or wall in directions around."""
     angle = np.arange(directions) * 2 * np.pi / directions
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     centres, radius = _discs(task)

@@ -1,24 +1,18 @@
 """RDES again without the slope that its network extrapolates: runs chosen before they are made.
 
 The question "extrapolation" of `population` asks whether RDES survives with theta held in the
-network. The runs that answer are the runs of RDES that were stopped, with noise that decays per
-episode: all of layouts A to F, and all of the drawn layouts. Of these, the first `SAMPLE`, one in
-each layout in a drawn order, were registered and made first; the others were registered when the
-results of the first were known.
+network. The runs that answer are all runs of RDES that were stopped, with noise that decays per
+episode. Of the drawn layouts, the first `SAMPLE` runs, one in each layout in a drawn order, were
+registered and made first; the others were registered when the results of the first were known.
 
-**Arms.** "theta held" and "true slope", of `analysis.extrapolation`. "nudged" is the control: the
-run as it was, with 1e-9 added to each number of theta_init. Learning is chaotic, and a run that was
-chosen because it was stopped may live when it is repeated for no better reason than that.
-
-**Measured.** Whether the run has all its episodes. The share that has is read by `rule.read`; its
-interval beside that one draws layouts. **The slope is the cause** if the true slope is confirmed in
-A to F and in the drawn layouts, and more runs live with it than nudged: in both, the interval of
-the difference, over layouts, lies above 0. The question that was registered is decided by its own
-border, of A to F alone.
+Arms are "theta held" and "true slope", of `analysis.extrapolation`, and as a control "nudged", with
+1e-9 added to each number of theta_init: learning is chaotic, and a run that was chosen because it
+was stopped may live when it is repeated for no better reason than that. A run lives that has all
+its episodes. **The slope is the cause** if the true slope is confirmed in A to F and in the drawn
+layouts, and in both the interval of the difference to nudged, over layouts, lies above 0.
 
 **Expected.** Of the nudged runs 10 to 50 % live, with theta held 50 to 90 %, with the true slope at
-least 90 %. Seen before: the two runs of Chapter 12 and three more, of which two lived with theta
-held and all with the true slope.
+least 90 %. Five runs were seen before: two lived with theta held, all with the true slope.
 """
 
 from functools import cache, partial
@@ -99,7 +93,7 @@ def survival(runs: pd.DataFrame, arm: str = "theta held") -> Answer:
 def live(runs: pd.DataFrame, arm: str, than: str = "none") -> Estimate:
     """The share of runs that live with an arm, minus the share with another; interval over layouts.
 
-    The runs are of `ends`, of one part. No run lives with "none", which leaves the share itself.
+    The runs are those of one part of `ends`; with "none" none lives.
     """
     by = runs.pivot(index=["layout", "seed"], columns="intervention", values="stopped").astype(int)
     gained = (by[than] - by[arm]).groupby(level="layout").agg(["sum", "size"]).to_numpy().T

@@ -6,8 +6,6 @@ mpcrl's example. Part "references": costs of a step that the learners are compar
 
 Part "spread": mpcrl's Q-learning with several solvers, then ours with the same disturbances. mpcrl
 acts with what it planned before a step of theta: the order "before". `train` plans anew: "after".
-
-The questions were written down before the seeds were run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -152,7 +150,7 @@ def spread(_: Any, __: str, ___: int, seed: int) -> Row:
 def q_learn(theta: Vector, e: Vector, *, newest: bool = False) -> tuple[float, Matrix]:
     """J and the thetas of Q-learning under some disturbances, without exploration.
 
-    `newest`: whether to plan anew after theta has moved, before acting.
+    With `newest` it plans anew after theta has moved, before acting.
     """
     nmpc, state, costs, path = controller(), gz.START, [], []
     plan = nmpc.solve(state, theta)

@@ -4,9 +4,9 @@ Parts, expected shares, thresholds and questions were committed before any run; 
 with that commit, whose file also says what each question measures and where yes ends. The question
 "extrapolation" is answered by `interventions`.
 
-The unit is a layout. Each has two seeds that no other layout has. A claim has several answers in a
-layout, one or two in each reading of the decay; it holds there if more than `MAJORITY` of them are
-yes. Shares of layouts are read by `rule.read`. A layout answers by the runs that are known.
+The unit is a layout. A claim has several answers in a layout, one or two in each reading of the
+decay; it holds there if more than `MAJORITY` of them are yes. Shares of layouts are read by
+`rule.read`. A layout answers by the runs that are known.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -40,15 +40,7 @@ from nmpcrl.claims.robustness import groups
 from nmpcrl.claims.rule import MAJORITY, Observations, Paths, forgiving, read
 from nmpcrl.claims.thresholds import was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
-from nmpcrl.studies.difficulty import (
-    DIFFICULTY,
-    HORIZONS,
-    MEASURES,
-    PILOT,
-    RIVALS,
-    SAME_CLOSING,
-    STOPS,
-)
+from nmpcrl.studies import difficulty
 from nmpcrl.studies.predictors import predictor_scores
 from nmpcrl.study import paper, published
 from nmpcrl.study.design import MAIN_TABLE, sweep
@@ -144,7 +136,7 @@ def _part(arms: Mapping[str, Any], places: Iterable[str], begin: int = 0) -> Par
 PARTS = {
     "judge": _part(arms(SOLVING), JUDGE),
     "tune": _part(arms(SOLVING_TWICE), TUNE),
-    **{f"N = {n}": _part(arms(SOLVING_TWICE, horizon=n), COMPARED) for n in HORIZONS},
+    **{f"N = {n}": _part(arms(SOLVING_TWICE, horizon=n), COMPARED) for n in difficulty.HORIZONS},
     "judge imitating": _part(arms(IMITATING), JUDGE),
     LARGER: _part(arms(PAPER, ["step"], alpha=STEP_SIZE * paper.ALPHA), COMPARED),
     "judge again": _part(arms((*SOLVING, *IMITATING)), JUDGE, begin=1),
@@ -175,7 +167,8 @@ class Drawn:
     @property
     def stops(self) -> pd.DataFrame:
         """The theta_c from which rollouts in compared layouts do not arrive, a column a horizon."""
-        return self.layouts.loc[[*COMPARED], [*STOPS.values()]].set_axis([*STOPS], axis=1)
+        stops = self.layouts.loc[[*COMPARED], [*difficulty.STOPS.values()]]
+        return stops.set_axis([*difficulty.STOPS], axis=1)
 
     @cached_property
     def shares(self) -> pd.DataFrame:
@@ -212,8 +205,8 @@ def of_table(table: pd.DataFrame) -> Drawn:
         for e, one in zip(made, known.to_dict("records"), strict=True)
     }
     runs = pd.DataFrame([*rows.values()]).assign(cost_ratio=[*cost_ratios(rows).values()])
-    layouts = DIFFICULTY.table().set_index("place").rename_axis("layout")
-    return Drawn(runs, _paths(table), layouts[[*MEASURES, *STOPS.values()]])
+    layouts = difficulty.DIFFICULTY.table().set_index("place").rename_axis("layout")
+    return Drawn(runs, _paths(table), layouts[[*difficulty.MEASURES, *difficulty.STOPS.values()]])
 
 
 def _paths(table: pd.DataFrame) -> Paths:
@@ -236,11 +229,10 @@ def load() -> Drawn:
 def by_layout(
     runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)
 ) -> pd.DataFrame:
-    """Where each claim holds in runs of one setting, a row a claim and layout with its answers.
+    """Where each claim holds in runs of one setting, a row a claim and layout.
 
-    Returns:
-        Columns claim, layout (its name), yes, of (answers), holds and weaker (whether the weaker
-        question holds there, if the claim has one; else as holds).
+    Columns claim, layout (its name), yes, of (answers), holds and weaker (whether the weaker
+    question holds there, if the claim has one; else as holds).
     """
     rows, there = [], {*runs.learner}
     for name in claims:
@@ -260,10 +252,9 @@ def by_layout(
 def shares(where: pd.DataFrame) -> pd.DataFrame:
     """The share of the layouts of `by_layout` in which each claim holds, beside the expected share.
 
-    Returns:
-        Columns claim, holding, layouts, share, low, high (by `rate`: layouts are independent),
-        outcome (by the rule, weaker questions included), weaker (layouts in which the weaker
-        question holds), expected (an outcome) and within (the share that was expected).
+    Columns claim, holding, layouts, share, low, high (by `rate`), outcome (by the rule, weaker
+    questions included), weaker (layouts in which the weaker question holds), expected (an outcome)
+    and within (the share that was expected).
     """
     rows = []
     for name, group in where.groupby("claim", sort=False):
@@ -291,11 +282,10 @@ def _holding(claim: str, drawn: Drawn) -> Answer:
 
 
 def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
-    """The part of the paper's picture that holds in each cell of runs of one setting.
+    """The part of the paper's picture that holds in each cell of runs with all four answers.
 
-    Returns:
-        Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
-        nothing but yes), answers (the mean share) and setting; cells with all four answers.
+    Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
+    nothing but yes), answers (the mean share) and setting.
     """
     answers = {name: BY_RUNS[name].answers(BY_RUNS[name].measure(runs, paths)) for name in PICTURE}
     cells = {name: yes.groupby(level=["layout", "decay"]).mean() for name, yes in answers.items()}
@@ -315,7 +305,7 @@ def whole_picture(tried: pd.DataFrame) -> Answer:
 
 def closing_gaps(layouts: pd.DataFrame, judged: pd.Series) -> Answer:
     """The answer of the measures of layouts, and of whether ES improves in each."""
-    closes = layouts.loc[judged.index, PILOT] < CLOSES_BEFORE
+    closes = layouts.loc[judged.index, difficulty.PILOT] < CLOSES_BEFORE
     counts = {
         "layouts fail where it closes": counted(~judged[closes]),
         "layouts succeed elsewhere": counted(judged[~closes]),
@@ -330,7 +320,7 @@ def predictors(drawn: Drawn) -> Answer:
     tuned, judged = succeeds(drawn.runs[drawn.runs.part == "tune"]), succeeds(drawn.main)
     if tuned.empty or judged.empty:
         return Answer(UNDECIDABLE)
-    ahead = predictor_scores(drawn.layouts, tuned, judged).ahead[[*RIVALS]]
+    ahead = predictor_scores(drawn.layouts, tuned, judged).ahead[[*difficulty.RIVALS]]
     lows, highs = ([getattr(one, end) for one in ahead] for end in ("low", "high"))
     outcome = above(min(lows), min(highs)) if np.isfinite(lows).all() else UNDECIDABLE
     beside = {"other measures surely behind": (sum(low > 0 for low in lows), len(lows))}
@@ -339,25 +329,25 @@ def predictors(drawn: Drawn) -> Answer:
 
 def horizon(runs: pd.DataFrame) -> Answer:
     """The answer of the runs of all parts: the first seeds, with each horizon."""
-    parts = {n: runs[runs.part == f"N = {n}"] for n in HORIZONS}
+    parts = {n: runs[runs.part == f"N = {n}"] for n in difficulty.HORIZONS}
     first = {*pd.concat(parts.values()).seed}
     parts[paper.HORIZON] = runs[(runs.part == "judge") & runs.seed.isin(first)]
     ends = pd.DataFrame({n: succeeds(one) for n, one in parts.items()}).dropna().astype(bool)
     failing = ends[~ends[paper.HORIZON]]
-    return share(~failing[[*HORIZONS]].any(axis=1), "layouts still fail")
+    return share(~failing[[*difficulty.HORIZONS]].any(axis=1), "layouts still fail")
 
 
 def gaps_and_horizon(stops: pd.DataFrame) -> Answer:
     """The answer of `Drawn.stops`; nan where a rollout arrives on the whole grid."""
     known = stops[stops[paper.HORIZON].notna()]
     apart = known.max(axis=1, skipna=False) - known.min(axis=1, skipna=False)
-    return share(apart <= SAME_CLOSING + 1e-9, "layouts the same")
+    return share(apart <= difficulty.SAME_CLOSING + 1e-9, "layouts the same")
 
 
 def caught(runs: pd.DataFrame, yes: str) -> Answer:
     """The share of layouts in which `yes`, an expression in columns, holds of all runs of ES.
 
-    Runs that arrive are not asked.
+    Only runs that do not arrive are asked.
     """
     away = runs[(runs.learner == "ES") & (runs.distance > ARRIVED)]
     answers = away.eval(yes)

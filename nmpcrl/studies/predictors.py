@@ -1,8 +1,7 @@
 """How well a number that is known before training predicts where learning succeeds.
 
 A predictor is a logistic regression of one measure, fitted on some layouts and scored on others: by
-the area under the ROC curve, which asks whether successes rank above failures, and by the Brier
-score, which asks for the probabilities themselves. The bootstrap draws layouts, never runs.
+the area under the ROC curve and by the Brier score. The bootstrap draws layouts.
 """
 
 from typing import Any
@@ -22,9 +21,8 @@ def predicted(measure: Vector, success: Vector, asked: Vector) -> tuple[float, V
     """The slope of a logistic regression, and P(success) = 1 / (1 + exp(-(intercept + slope z))).
 
     It is fitted to `measure` and `success`, one a layout; the probabilities are those where the
-    measure is `asked`. z is the measure, standardised. The log loss is least with `RIDGE` times
-    half of the squared slope added, which keeps the slope finite where a measure separates
-    successes from failures.
+    measure is `asked`. z is the measure, standardised. `RIDGE` times half of the squared slope is
+    added to the log loss: the slope stays finite where a measure separates the two outcomes.
     """
     x, sign = np.asarray(measure, float), np.where(success, 1.0, -1.0)
     if not np.isfinite(x).all():
@@ -42,9 +40,9 @@ def predicted(measure: Vector, success: Vector, asked: Vector) -> tuple[float, V
 
 
 def auc(score: Vector, success: Vector) -> Any:
-    """Probability that a success scores above a failure, a tie counting one half.
+    """Probability that a success scores above a failure, over the last axis; a tie counts one half.
 
-    nan where all layouts succeed, or none. Layouts are the last axis, as they are of `brier`.
+    nan where all layouts succeed, or none.
     """
     y = np.asarray(success, bool)
     won, lost = y.sum(axis=-1), (~y).sum(axis=-1)
@@ -59,16 +57,11 @@ def brier(probability: Vector, success: Vector) -> Any:
 
 
 def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Series) -> pd.DataFrame:
-    """Each measure as a predictor of success, fitted on some layouts and scored on others.
+    """Each measure as a predictor of success, fitted on layouts `tuned` and scored on `judged`.
 
-    Args:
-        difficulty: columns `MEASURES`, a row a layout.
-        tuned: whether learning succeeds, by layout, for the fit.
-        judged: the same, by layout, for the scores.
-
-    Returns:
-        A row a measure: slope (of the standardised measure), auc and brier, each an `Estimate`,
-        and ahead, by how much the area of `PILOT` is larger (an `Estimate`; 0 for itself).
+    `difficulty` has the columns `MEASURES` and a row a layout. A row a measure: slope (of the
+    standardised measure), auc and brier, each an `Estimate`, and ahead, by how much the area of
+    `PILOT` is larger (an `Estimate`; 0 for itself).
     """
     known, asked, y = difficulty.loc[tuned.index], difficulty.loc[judged.index], judged.to_numpy()
     found = {

@@ -3,9 +3,9 @@
 Settings, parts, questions and the rule of the advice were committed before any entry was tuned or
 judged; the file of that commit says what each question measures, and which pilots were known.
 
-An entry begins from theta_init with 50 or 300 episodes a layout and seed. Every episode counts: one
-with noise, one that confirms a step, one of a search. An entry with settings tries four of them in
-the layouts of `tune`, the default first; the one with the greatest gain is judged.
+An entry begins from theta_init with 50 or 300 episodes a layout and seed. An entry with settings
+tries four of them in the layouts of `tune`, the default first; the one with the greatest gain is
+judged.
 
 The **gain** is the share of the possible one, (J_init - J) / (J_init - J_best), of rollouts without
 noise: the interquartile mean over layouts of the mean over seeds, with an interval of 95 % by a
@@ -53,7 +53,6 @@ NEARLY = 0.9  # of the possible gain, in "search nears the best"
 CONTROL = "frozen"  # the entry without advice
 NO_DIFFERENCE = "no difference shown"  # an interval that holds 0 confirms nothing in part
 SECONDS = 0.013  # of processor time an episode, as long as no row of the entry is known
-
 _STEP_SIZES = tuple({"alpha": alpha} for alpha in (1e-7, 3e-8, 3e-7, 1e-6))
 _RADII = tuple({"radius": radius} for radius in (0.3, 0.1, 0.03, 1.0))
 SETTINGS: Mapping[str, tuple[Mapping[str, float], ...]] = {  # beta keeps its ratio to alpha
@@ -77,9 +76,6 @@ SETTINGS: Mapping[str, tuple[Mapping[str, float], ...]] = {  # beta keeps its ra
 }
 CONTROLS = ("guarded-RDES", "control-RDES")  # of what a guard does
 DEAR = ("RDES", "DES", "GN-J", "undone-GN-J", "DPG")  # more than a second a layout at 50
-
-
-# Parts.
 
 
 def arms(entry: str) -> dict[str, Entry]:
@@ -113,11 +109,6 @@ def run(setting: Setting, place: str, episodes: int, seed: int) -> Row:
     return {"entry": entry.name, "best": best.get(place, found["cost"]), **found}
 
 
-def _search(setting: Setting, place: str, episodes: int, _: int) -> Row:
-    """The search for J_best, with the same seed in each layout."""
-    return run(setting, place, episodes, YARDSTICK_SEED)
-
-
 def _part(
     entries: Callable[[pd.DataFrame], Iterable[Entry]],
     places: Sequence[str],
@@ -139,17 +130,22 @@ def _part(
     return Part(run, settings, places, episodes, seeds, first=fewer, seconds=SECONDS)
 
 
-def _settings(_: pd.DataFrame) -> list[Entry]:
-    """Every entry with each of its settings."""
-    return [one for entry in SETTINGS if SETTINGS[entry] for one in arms(entry).values()]
-
-
 _TUNED, _JUDGED, _NAMED = tuple(TUNE)[:15], tuple(JUDGE), tuple("ABCDEF")
 _NONE = dict.fromkeys(CONTROLS, 0)
 _SEARCH = {"CMA-ES": (ENTRIES["CMA-ES"], dict[str, float]())}
 PARTS: Mapping[str, Part] = {
-    "best": Part(_search, _SEARCH, (*_TUNED, *_JUDGED, *_NAMED), YARDSTICK, seconds=SECONDS),
-    "tune": _part(_settings, _TUNED, 50),
+    "best": Part(
+        lambda setting, place, episodes, _: run(setting, place, episodes, YARDSTICK_SEED),
+        _SEARCH,
+        (*_TUNED, *_JUDGED, *_NAMED),
+        YARDSTICK,
+        seconds=SECONDS,
+    ),
+    "tune": _part(
+        lambda _: [one for entry in SETTINGS if SETTINGS[entry] for one in arms(entry).values()],
+        _TUNED,
+        50,
+    ),
     "judge 50": _part(tuned, _JUDGED, 50, 2, {"GN-J": 60}),
     "judge 300": _part(tuned, _JUDGED[:60], 300, 1, {**dict.fromkeys(DEAR, 20), **_NONE}),
     "named 50": _part(tuned, _NAMED, 50, 10),
@@ -162,9 +158,6 @@ def _compile_ahead(missing: Iterable[tuple[Condition, Setting]]) -> None:
     """Call each kind of entry once, so that no row's time includes a compilation."""
     for name in dict.fromkeys(entry.name for _, (entry, _) in missing):
         judge(ENTRIES[name], "J001", 0, 3)
-
-
-# The measure.
 
 
 def shares(runs: pd.DataFrame) -> pd.Series:
@@ -227,8 +220,6 @@ def _runs(table: pd.DataFrame, part: str, entry: str) -> pd.DataFrame:
     return table[(table.part == part) & (table.entry == entry)]
 
 
-# Advice.
-
 FIRST, SECOND, LATER, OPEN, NEVER = "first", "second", "later", "open", "never"
 ADVICE: Mapping[str, str] = {  # in the order in which they are asked; `frozen` is not advised on
     NEVER: "at every budget at which it is judged, the share of the possible gain lies below 0 with"
@@ -244,11 +235,10 @@ EXPECTED_NEVER = ("DPG",)
 
 
 def advice(table: pd.DataFrame) -> pd.DataFrame:
-    """The advice on each entry by `ADVICE`, the first to try first.
+    """The advice on each entry by `ADVICE`, the first to try first; a row an entry and part.
 
-    Returns:
-        A row an entry and part of `ADVISED`, with the fields of `RemedyRow`, the lower end `low` of
-        the gain, the `word` of the advice, and `tuning`, the rollouts that its tuning took.
+    It has the fields of `RemedyRow`, the lower end `low` of the gain, the `word` of the advice, and
+    `tuning`, the rollouts that its tuning took.
     """
     judged = [row for part in ADVISED for row in rows(table[table.part == part])]
     found = pd.DataFrame(judged, columns=RemedyRow._fields)
@@ -285,9 +275,6 @@ def expectations(advised: pd.DataFrame) -> dict[str, bool]:
         for budget, entry in EXPECTED_FIRST.items()
         if budget in first
     } | {f"{one} is never advised": words[one] == NEVER for one in EXPECTED_NEVER if one in words}
-
-
-# Questions.
 
 
 def _paired(table: pd.DataFrame, part: str, *entries: str) -> pd.DataFrame:

@@ -51,8 +51,7 @@ def fires(values: Sequence[float]) -> bool:
     """Whether Shewhart's chart fires on the last value: |x - mean| > LIMIT s, or x is nan.
 
     Mean and standard deviation s are those of the `WINDOW` values before. Independent normal values
-    fire falsely with the probability that a t of WINDOW - 1 degrees of freedom exceeds
-    LIMIT / sqrt(1 + 1 / WINDOW): 0.001 an episode.
+    fire falsely with a probability of 0.001.
     """
     *before, value = values[-WINDOW - 1 :]
     if len(before) < WINDOW:
@@ -87,12 +86,9 @@ def changing(
 ) -> Iterator[tuple[World, bool, Vector]]:
     """Algorithm 1 from theta_init: after each episode its world, whether a chart fires, and theta.
 
-    Args:
-        layouts: the obstacles of each.
-        order: the number of the layout of each episode.
-        knows: "told", "cost", "delta" or "never".
-        reset: whether theta begins anew after a change.
-        raised: the learner in the `FOR` episodes after a change, if it is another.
+    `order` has the number of the layout of each episode; `knows` is "told", "cost", "delta" or
+    "never". With `reset` theta begins anew after a change; `raised` is the learner in the `FOR`
+    episodes after a change, if it is another.
     """
     world_of = cache(lambda true, seen: World(layouts[true], seen=layouts[seen]))
     first = Weights(THETA, np.full(THETA.size, paper.W_INIT))

@@ -1,8 +1,7 @@
 """Runs among obstacles that move, with a wrong model, or with a richer terminal cost.
 
-Each function takes the setting of an arm, a place, a number of episodes and a seed, and returns a
-row of `worlds.py`. A policy is "init", "grid" (over theta_c), "CMA-ES" or "ES"; and where the model
-can be learned "ES+model", "oracle" or "oracle+ES".
+A policy is "init", "grid" (over theta_c), "CMA-ES" or "ES"; and where the model can be learned
+"ES+model", "oracle" or "oracle+ES".
 """
 
 from collections.abc import Iterable, Mapping, Sequence

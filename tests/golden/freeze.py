@@ -440,12 +440,15 @@ def best_settings() -> Any:
 
 @entry("agents")
 def answers_on_agents() -> Any:
-    return by_question(agents.answers(trained(), suite()).values())
+    return by_question(agents.SAC_AND_TD3.judge((trained(), suite())).values())
 
 
 @entry("agents")
 def answers_without_the_suite() -> Any:
-    return {name: one.outcome for name, one in agents.answers(trained(), suite()[:0]).items()}
+    return {
+        name: one.outcome
+        for name, one in agents.SAC_AND_TD3.judge((trained(), suite()[:0])).items()
+    }
 
 
 @entry("agents")

@@ -10,7 +10,6 @@ from nmpcrl.studies.agents import (
     PARTS,
     SAC_AND_TD3,
     SETTINGS,
-    answers,
     tuned,
 )
 from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
@@ -54,7 +53,7 @@ def every_other(table):
 
 
 def test_without_runs_no_question_is_decided():
-    found = answers(pd.DataFrame(columns=COLUMNS), NOTHING)
+    found = SAC_AND_TD3.judge((pd.DataFrame(columns=COLUMNS), NOTHING))
     assert [*found] == [*SAC_AND_TD3.asked]
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
 
@@ -82,7 +81,7 @@ def test_without_runs_no_question_is_decided():
     ],
 )  # fmt: skip
 def test_answers_follow_from_costs_and_arrivals(table, compared, expected):
-    found = answers(table, compared)
+    found = SAC_AND_TD3.judge((table, compared))
     said = {name: (found[name].outcome, *found[name].counts.values()) for name in expected}
     assert said == {name: (outcome, (yes, of)) for name, (outcome, yes, of) in expected.items()}
 
