@@ -5,7 +5,7 @@ result by a rollout without noise.
 """
 
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
-from nmpcrl.learning.batches import batch_semi_gradient, batched, lstd_q
+from nmpcrl.learning.batches import batched, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
 from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.gymnasium import as_gymnasium
@@ -22,7 +22,7 @@ from nmpcrl.learning.learners import (
     regularized_deep_expected_sarsa,
 )
 from nmpcrl.learning.network import QNetwork
-from nmpcrl.learning.optimisers import Adam, Descent, GaussNewton, Optimiser, TrustRegion
+from nmpcrl.learning.optimisers import Descent, GaussNewton, Optimiser, TrustRegion
 from nmpcrl.learning.policy_gradient import policy_gradient
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import (
@@ -43,13 +43,11 @@ from nmpcrl.learning.updates import (
 )
 
 __all__ = [
-    "Adam", "Bootstrap", "Descent", "Diverged", "Episode", "Exploration", "GaussNewton",
-    "Imitation", "Learner", "NextValue", "Optimiser", "QNetwork", "Rollout", "SecondSolve",
-    "Step", "Transition", "TrustRegion", "Update", "UpdateRule", "Weights", "as_gymnasium",
-    "auxiliary_step", "batch_semi_gradient", "batched", "count_episodes", "count_steps",
-    "curvature_correction", "deep_expected_sarsa", "episodes", "evaluate", "expected_sarsa",
-    "frozen", "gradient_expected_sarsa", "gradient_td_step", "gradient_tdc", "lstd_q",
-    "policy_gradient", "project", "q_learning", "random_direction",
-    "regularized_deep_expected_sarsa", "semi_gradient_step", "step_matched", "td_error",
-    "train",
+    "Bootstrap", "Descent", "Diverged", "Episode", "Exploration", "GaussNewton", "Imitation",
+    "Learner", "NextValue", "Optimiser", "QNetwork", "Rollout", "SecondSolve", "Step", "Transition",
+    "TrustRegion", "Update", "UpdateRule", "Weights", "as_gymnasium", "auxiliary_step", "batched",
+    "count_episodes", "count_steps", "curvature_correction", "deep_expected_sarsa", "episodes",
+    "evaluate", "expected_sarsa", "frozen", "gradient_expected_sarsa", "gradient_td_step",
+    "gradient_tdc", "lstd_q", "policy_gradient", "project", "q_learning", "random_direction",
+    "regularized_deep_expected_sarsa", "semi_gradient_step", "step_matched", "td_error", "train",
 ]  # fmt: skip

@@ -1,18 +1,22 @@
 """Where the value of the next state comes from: a second solve, or a network that imitates one."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from functools import cache
+from itertools import product
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution
-from nmpcrl.learning.minimiser import minimiser
 
 if TYPE_CHECKING:
     from nmpcrl.learning.network import Predictor, QNetwork, Target
+
+FIRST, NEXT = 15, 5  # points a side of the grids of `minimiser`
+ROUNDS = 4  # of the grids after the first; the last has a spacing of 1/112 of the box's half width
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +45,6 @@ class NextValue:
     seconds: float = 0.0  # spent on fit and prediction [s]; a solve keeps its own time
 
 
-class Moves(NamedTuple):
-    """How a rule moves theta, where `loop` knows it: `Rule.moves`."""
-
-    alpha: float  # step size of theta
-    beta: float | None = None  # of w, in gradient TD; None for a semi-gradient
-    gamma: float | None = None  # discount factor of gradient TD
-    curvature: bool = False  # whether that is exact TDC
-    projection: tuple[float, float] | None = None  # least and largest component of theta
-
-
 class Controller(Protocol):
     """All that learning asks of control: `nmpcrl.control.Nmpc`, or anything that acts like it."""
 
@@ -59,21 +53,13 @@ class Controller(Protocol):
         """The discount factor of the value."""
 
     def solve(
-        self,
-        state: Vector,
-        theta: Vector,
-        warm_start: Solution | None = None,
-        action: Vector | None = None,
-        *,
-        data: Mapping[str, Any] | None = None,
-    ) -> Solution:
+        self, state: Vector, theta: Vector, warm_start: Solution | None = None,
+        action: Vector | None = None, *, data: Mapping[str, Any] | None = None,
+    ) -> Solution:  # fmt: skip
         """See `nmpcrl.control.Nmpc.solve`; data are given only where there are any."""
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """See `nmpcrl.control.Nmpc.value_hessian_times`; only exact TDC asks for it."""
-
-    def value_hessian(self, solution: Solution) -> Matrix:
-        """See `nmpcrl.control.Nmpc.value_hessian`; only LSTD-Q with curvature asks for it."""
 
     def policy_jacobian(self, solution: Solution) -> Matrix:
         """See `nmpcrl.control.Nmpc.policy_jacobian`; only DPG asks for it."""
@@ -93,18 +79,11 @@ class SecondSolve:
     nmpc: Controller
 
     def __call__(self, transition: Transition, theta: Vector) -> NextValue:
-        """Start from the first solution, shifted by a stage.
-
-        Raises:
-            SolverError: no optimum was found.
-        """
+        """Start from the first solution, shifted by a stage."""
         if transition.end:
             return NextValue(0.0, np.zeros(theta.size))
-        what = (transition.next_state, theta, transition.solution)
-        if transition.next_data is None:
-            solution = self.nmpc.solve(*what)
-        else:
-            solution = self.nmpc.solve(*what, data=transition.next_data)
+        known: Any = {} if transition.next_data is None else {"data": transition.next_data}
+        solution = self.nmpc.solve(transition.next_state, theta, transition.solution, **known)
         return NextValue(solution.value, solution.features, solution)
 
 
@@ -126,29 +105,21 @@ class Imitation:
 
     def __call__(self, transition: Transition, theta: Vector) -> NextValue | None:
         """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+); a+ = u_1 of the plan."""
-        began = time.perf_counter()
-        solution = transition.solution
-        self.network.remember(  # departure R
-            self.inputs(transition.state, transition.action, solution.theta), solution.value
-        )
+        began, solution, loss = time.perf_counter(), transition.solution, np.nan
+        example = self.inputs(transition.state, transition.action, solution.theta)
+        self.network.remember(example, solution.value)  # departure R
         value = self._predict(transition, theta) if self.late else None
-        loss = self._fit()
+        if self.network.ready:
+            for _ in range(self.fits):
+                loss = self.network.fit()
+            if self.target:
+                self.target.follow()
         if not self.late:
             value = self._predict(transition, theta)
         if value is None:
             return None
         value = 0.0 if transition.end else value
         return NextValue(value, loss=loss, seconds=time.perf_counter() - began)
-
-    def _fit(self) -> float:
-        """The loss of the last fit in this step; nan if there are too few examples for one."""
-        if not self.network.ready:
-            return np.nan
-        for _ in range(self.fits):
-            loss = self.network.fit()
-        if self.target:
-            self.target.follow()
-        return loss
 
     def _predict(self, transition: Transition, theta: Vector) -> float | None:
         """Q(s+, a+); None while a gated bootstrap waits for the first fit."""
@@ -168,8 +139,7 @@ class Imitation:
         where = slice(state.size, state.size + lower.size)
 
         def values(actions: Matrix) -> Vector:
-            rows = np.empty((len(actions), inputs.size))
-            rows[:] = inputs
+            rows = np.tile(inputs, (len(actions), 1))
             rows[:, where] = actions
             return predictor.predict(rows)
 
@@ -178,3 +148,22 @@ class Imitation:
     def inputs(self, state: Vector, action: Vector, theta: Vector) -> Vector:
         """The network's inputs: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
         return np.concatenate([state, action, theta] if self.with_theta else [state, action])
+
+
+def minimiser(values: Callable[[Matrix], Vector], lower: Vector, upper: Vector) -> Vector:
+    """The point of a box in which a function of many points, (points, m), is least.
+
+    A grid covers the box; each further one covers the cells around the best point so far.
+    """
+    best, half = (lower + upper) / 2, (upper - lower) / 2
+    for side in (FIRST, *[NEXT] * ROUNDS):
+        points = np.minimum(np.maximum(best + half * _grid(side, len(best)), lower), upper)
+        best = points[values(points).argmin()]
+        half = half * (2 / (side - 1))  # the spacing of this grid
+    return best
+
+
+@cache
+def _grid(side: int, m: int) -> Matrix:
+    """The points of a grid of [-1, 1]^m, shape (side^m, m)."""
+    return np.array([*product(np.linspace(-1, 1, side), repeat=m)])

@@ -15,7 +15,8 @@ from .charge import charge
 from .dense import at_addresses, fit, follow, predict, remember
 from .entries import COLD, address, lengths, unpacked
 from .find import find
-from .loop import COUNT, _td_error, copy, episode, move, plain, start_in
+from .loop import COUNT, copy, episode, move, plain, start_in
+from .loop import td_error as error
 from .model import NTHETA, NU, NX, transition
 from .slopes import slopes
 
@@ -73,7 +74,7 @@ def learn(
 @njit(float64(float64, float64, float64, float64), error_model="numpy")
 def td_error(cost, gamma, q, q_next):
     """Eq. (7)."""
-    return _td_error(cost, gamma, q, q_next)
+    return error(cost, gamma, q, q_next)
 
 
 @njit(

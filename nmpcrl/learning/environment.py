@@ -1,11 +1,12 @@
-"""The environment that a controller acts in: it need not be what the NMPC plans with.
+"""The environment that a controller acts in, which need not be what its NMPC plans with.
 
-A `gymnasium.Env` is one, too: a reward is a cost with the other sign. What Gymnasium calls
-terminated ends an episode in a state that is worth 0; after a truncation the state keeps its worth.
+A `gymnasium.Env` is one, too: a reward is a cost with the other sign. A state in which Gymnasium
+terminates an episode is worth 0; after a truncation a state keeps its worth.
 
-Functions of the user are given copies, and what they return is copied, as numbers of type float.
+Functions of the user are given copies, and their results are copied, as numbers of type float.
 """
 
+import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -42,25 +43,23 @@ def environment(
     plant: Plant | StepFunction | GymnasiumEnv | None = None,
     start: Start | None = None,
 ) -> Environment:
-    """The environment of an NMPC.
+    """The environment of an NMPC, checked.
 
     Args:
-        nmpc: has bounds, and where it has a task a start and the cost of Eq. (20). None if what
-            plans is another controller.
+        nmpc: has bounds, and where it has a task a start and the cost of Eq. (20). None if another
+            controller plans.
         plant: a `Plant`, whose cost is the task's; or (state, action, rng) -> (next state, cost,
             end), for any other, such as a disturbed one, with any cost and end of its own. A fourth
-            value, if there is one, ends the episode in a state that keeps its worth. It is given
-            copies. Or a `gymnasium.Env`. The plant that plans if absent.
+            value, if there is one, ends the episode in a state that keeps its worth. Or a
+            `gymnasium.Env`. The plant that plans if absent.
         start: a state, or rng -> state; the task's if absent. With the same start, no noise in the
             plant and no exploration, all seeds are one run: that they agree says nothing.
 
     Raises:
-        ValueError: the NMPC is of a `Problem`, or there is none, and plant or start is missing; a
-            function takes other arguments; or the plant has other sizes or narrower bounds than the
-            plan; or a `gymnasium.Env` is given a start.
+        ValueError: plant or start is missing, as for a `Problem`, or does not fit the plan.
     """
-    if is_gymnasium(plant):
-        return of_gymnasium(plant, nmpc, start)
+    if hasattr(plant, "reset") and hasattr(plant, "action_space"):
+        plant, start = of_gymnasium(plant, nmpc, start)
     states, task = (nmpc.n, nmpc.task) if nmpc else (None, None)
     if nmpc and task:
         start = task.start if start is None else start
@@ -76,7 +75,12 @@ def environment(
     else:
         refuse_other(PLANT, plant, 3)
         step = checked(cast(StepFunction, plant), states)
-    return Environment(step, begun(start, states))
+    if callable(start):
+        begin = start
+        refuse_other("start is called as start(rng) and returns a state", begin, 1)
+        return Environment(step, lambda rng: state_of("start returned", begin(rng), states))
+    first = state_of("start =", start, states)
+    return Environment(step, lambda _: first.copy())
 
 
 def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
@@ -93,16 +97,18 @@ def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
     return step
 
 
-def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, Any]] | None:
-    """The data of `Nmpc.solve` at each time t of an episode; None without data.
+def forecasts(data: Data | None, horizon: int) -> Callable[[int], dict[str, Any]]:
+    """The options of `Nmpc.solve` at each time t of an episode: its data, or none.
 
     Of an array over the times, a plan at t sees t, ..., t + N, and the last entry beyond its end.
     """
     if data is None:
-        return None
+        return lambda _: {}
     if callable(data):
         refuse_other("data is called as data(t) and returns arrays by name", data, 1)
-        return lambda t: {name: numbers(f"data {name}", one) for name, one in data(t).items()}
+        return lambda t: {
+            "data": {name: numbers(f"data {name}", one) for name, one in data(t).items()}
+        }
     series = {name: np.array(values, float) for name, values in data.items()}
     for name, values in series.items():
         if not values.ndim or not len(values):
@@ -110,34 +116,33 @@ def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, A
 
     def window(t: int) -> dict[str, Any]:
         times = np.arange(t, t + horizon + 1)
-        return {name: v[np.minimum(times, len(v) - 1)] for name, v in series.items()}
+        return {"data": {name: v[np.minimum(times, len(v) - 1)] for name, v in series.items()}}
 
     return window
 
 
-def begun(start: Any, states: int | None) -> Callable[[np.random.Generator], Vector]:
-    """The start of an episode, from a state or a function of the user."""
-    if callable(start):
-        refuse_other("start is called as start(rng) and returns a state", start, 1)
-        return lambda rng: state_of("start returned", start(rng), states)
-    state = state_of("start =", start, states)
-    return lambda _: state.copy()
-
-
-def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool = False) -> str:
-    """Why no plan can begin in a state of the plant; "" if one can.
-
-    A state in which an episode ends has to be finite only.
-    """
-    largest = np.inf if nmpc is None or end else nmpc.farthest
-    if sum(map(abs, state.tolist())) < largest:  # false for nan, and faster than NumPy
-        return ""
-    if np.isfinite(state).all() and (np.abs(state) <= largest).all():
+def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool) -> str:
+    """Why no plan can begin in a state of the plant; "" if one can, or it is finite at the end."""
+    largest = sys.float_info.max if nmpc is None or end else nmpc.farthest
+    if all(abs(number) <= largest for number in state.tolist()):
         return ""
     return (
         f"no plan can begin in state {short(state)}, to which the plant ran away: its numbers must"
         f" be finite and of size at most {largest:g}"
     )
+
+
+def nmpc_of(controller: Any) -> Nmpc | None:
+    """The `Nmpc` that a controller is or has among its attributes; None where there is none."""
+    near = [controller, *getattr(controller, "__dict__", {}).values()]
+    return next((one for one in near if isinstance(one, Nmpc)), None)
+
+
+def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
+    """A generator as it is; of an int one whose numbers `default_rng` of that int does not draw."""
+    if isinstance(rng, int | np.integer):
+        rng = np.random.SeedSequence(int(rng), spawn_key=(key,))  # type: ignore[assignment]
+    return np.random.default_rng(rng)
 
 
 def state_of(said: str, given: Any, states: int | None, *, finite: bool = True) -> Vector:
@@ -167,18 +172,12 @@ def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:
         )
 
 
-def is_gymnasium(plant: Any) -> bool:
-    """Whether this is a `gymnasium.Env`, or acts like one."""
-    return hasattr(plant, "reset") and hasattr(plant, "action_space")
-
-
-def of_gymnasium(env: GymnasiumEnv, nmpc: Nmpc | None, start: Any = None) -> Environment:
-    """The environment whose states are the observations of `env`, and its costs minus the rewards.
+def of_gymnasium(
+    env: GymnasiumEnv, nmpc: Nmpc | None, start: Any
+) -> tuple[StepFunction, Callable[[np.random.Generator], Vector]]:
+    """`env` as plant and start: its observations are states, and minus its rewards are costs.
 
     Each episode resets `env` with a seed that the generator of the run draws.
-
-    Raises:
-        ValueError: its observations or actions are not those of the plan, or a start is given.
     """
     if start is not None:
         raise ValueError("a gymnasium.Env draws its own start: leave start= out")
@@ -192,16 +191,15 @@ def of_gymnasium(env: GymnasiumEnv, nmpc: Nmpc | None, start: Any = None) -> Env
     if nmpc:
         refuse_narrower("the environment's actions", space.low.ravel(), space.high.ravel(), nmpc)
 
-    def begin(rng: np.random.Generator) -> Vector:
-        observation, _ = env.reset(seed=int(rng.integers(2**31)))
-        return state_of("env.reset returned", observation, sizes[0])
+    def begin(rng: np.random.Generator) -> Any:
+        return env.reset(seed=int(rng.integers(2**31)))[0]
 
     def step(_: Vector, action: Vector, __: np.random.Generator) -> tuple[Any, ...]:
         applied = np.asarray(action, env.action_space.dtype).reshape(env.action_space.shape)
         observation, reward, terminated, truncated, _ = env.step(applied)
         return observation, -float(reward), terminated, truncated
 
-    return Environment(checked(step, sizes[0]), begin)
+    return step, begin
 
 
 def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:

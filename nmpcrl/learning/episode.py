@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
@@ -14,19 +15,21 @@ from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.solvers import riccati
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.learning.baselines import nothing
-from nmpcrl.learning.bootstrap import Controller, Imitation, Moves, NextValue, SecondSolve
-from nmpcrl.learning.learners import Learner, Weights
+from nmpcrl.learning.bootstrap import Imitation, NextValue, SecondSolve
+from nmpcrl.learning.learners import GradientTD, Learner, SemiGradient, Weights
 from nmpcrl.learning.network import QNetwork, Target, machine_code
-from nmpcrl.learning.training import Exploration, Step, Trainer, absurd, trainer_of
+from nmpcrl.learning.training import Exploration, Step, Trainer, absurd
+from nmpcrl.learning.updates import auxiliary_step
 
 NOTICE = "Compiling Algorithm 1 (once on this machine) ..."
 COMPILED = """from numba import njit
 
-from .loop import ABSENT, EXACT, FUNCTIONS, GRADIENT_TD, SEMI_GRADIENT, SIGNATURE, episode
+from . import loop
 
-signatures = (FUNCTIONS[1], *FUNCTIONS[4:])
-absent = [njit(one, cache=True)(function) for one, function in zip(signatures, ABSENT)]
-episode = njit(SIGNATURE, cache=True, error_model="numpy", no_cfunc_wrapper=True)(episode)
+signatures = (loop.FUNCTIONS[1], *loop.FUNCTIONS[4:])
+absent = [njit(one, cache=True)(function) for one, function in zip(signatures, loop.ABSENT)]
+options = {"error_model": "numpy", "no_cfunc_wrapper": True}
+episode = njit(loop.SIGNATURE, cache=True, **options)(loop.episode)
 """
 TEXTS = {
     "__init__": COMPILED,
@@ -36,12 +39,11 @@ TEXTS = {
         for name in ("loop", "updates", "dense")
     },
 }
-NOTHING, SECOND_SOLVE, NETWORK = range(3)  # as in `loop`
 NO_NETWORK = (
     np.zeros((1, 1), np.float32), np.zeros((0, 1), np.float32), np.zeros(0, np.int32),
     np.zeros(2, np.int64), np.zeros(1, np.uint64), np.ones(1), 0.0, np.zeros(4, np.int64),
 )  # fmt: skip
-NUMBERS = (  # a column each, as in `loop`; nan or 0 where there is none
+NUMBERS = (  # a column each, which `loop` knows by its place; nan or 0 where there is none
     "cost",  # l(s, a)
     "value",  # Q(s, a)
     "next_value",  # Q(s+, a+)
@@ -71,35 +73,21 @@ class Episode:
 
 
 def episodes(
-    learner: Learner,
-    controller: Controller,
-    weights: Weights,
-    explore: Exploration,
-    **options: Any,
+    learner: Learner, controller: Any, weights: Weights, explore: Exploration, **options: Any
 ) -> Iterator[Episode]:
     """The steps of `train` to the last bit, by episodes; the arguments are the same.
 
-    For a learner that is built in, with riccati and a `Plant`, one compiled function makes them.
-    A step of which it cannot make a part, as where fatrop takes over, is made by `train`.
-
-    Raises:
-        ValueError, Diverged: as `train`.
+    For a learner that is built in, with riccati and a `Plant`, one compiled function makes them,
+    and `train` a step in which that fails, as where fatrop takes over.
     """
-    return _episodes(trainer_of(learner, controller, weights, explore, **options))
+    trainer = Trainer(learner, controller, weights, explore, **options)
+    return trainer.run(partial(_episode, trainer, Loop.of(trainer)))
 
 
-def _episodes(trainer: Trainer) -> Iterator[Episode]:
-    loop, weights, failed = Loop.of(trainer), trainer.weights, 0
-    for number in range(len(trainer.explore.scale)):
-        made = _episode(trainer, loop, number, weights)
-        weights = made.weights
-        yield made
-        trainer.judge(weights)
-        failed = trainer.counted(failed, made.failure)
-
-
-def _episode(trainer: Trainer, loop: "Loop | None", number: int, weights: Weights) -> Episode:
-    """An episode; a step that the loop does not make is one of `train`, and then it goes on."""
+def _episode(
+    trainer: Trainer, loop: "Loop | None", number: int, weights: Weights
+) -> Iterator[Episode]:
+    """One episode: the steps of the loop, and of `train` where there is none or it fails."""
     nmpc, d, failure, solver = trainer.nmpc, weights.theta.size, "", ""
     sizes = {"state": nmpc.n, "action": nmpc.m, "features": d, "theta": d, "w": d}
     noise = np.ascontiguousarray(trainer.explore.scaled[number])
@@ -122,91 +110,84 @@ def _episode(trainer: Trainer, loop: "Loop | None", number: int, weights: Weight
         state, warm = step.next_state, step.warm
     numbers, *parts = np.split(rows[:t], np.cumsum([len(NUMBERS), *sizes.values()])[:-1], axis=1)
     columns = dict(zip(NUMBERS, numbers.T, strict=True)) | dict(zip(sizes, parts, strict=True))
-    return Episode(number, columns, weights, failure, solver)
+    yield Episode(number, columns, weights, failure, solver)
 
 
 def _row(step: Step) -> Vector:
     """A step as a row of `Episode`."""
-    update, solution, solves, theta = step.update, step.solution, step.solves, step.weights.theta
+    update, solution, solves, weights = step.update, step.solution, step.solves, step.weights
     after = (update and update.successor) or NextValue(np.nan)
-    numbers = {
-        "cost": step.cost,
-        "value": solution.value if solution else np.nan,
-        "next_value": after.value,
-        "delta": np.nan if update is None or update.delta is None else update.delta,
-        "loss": after.loss,
-        "restarts": sum(one.restarts for one in solves),
-        "violation": max((one.violation for one in solves), default=np.nan),
-        "iterations": sum(one.iterations for one in solves),
-        "solves": len(solves),
-    }
-    features = solution.features if solution else np.full(theta.size, np.nan)
-    row = [numbers[name] for name in NUMBERS]
-    return np.concatenate([row, step.state, step.action, features, theta, step.weights.w])
+    numbers = (
+        step.cost,
+        solution.value if solution else np.nan,
+        after.value,
+        np.nan if update is None or update.delta is None else update.delta,
+        after.loss,
+        sum(one.restarts for one in solves),
+        max((one.violation for one in solves), default=np.nan),
+        sum(one.iterations for one in solves),
+        len(solves),
+    )
+    features = solution.features if solution else np.full(weights.theta.size, np.nan)
+    return np.concatenate([numbers, step.state, step.action, features, weights.theta, weights.w])
 
 
 class Loop:
     """`loop.episode` with the learner, the plant and the controller of a trainer."""
 
     def __init__(
-        self, trainer: Trainer, moves: Moves, machine: Any, fixed: Any, *functions: Any
-    ) -> None:
+        self, trainer: Trainer, step: SemiGradient | GradientTD, machine: Any, fixed: Any,
+        *functions: Any,
+    ) -> None:  # fmt: skip
         """Compile it, if that was not done before on this machine.
 
         Args:
             trainer: has everything else.
-            moves: how theta moves; step sizes of 0 where nothing is learned.
+            step: moves theta.
             machine: the solver, as `Nmpc.machine` returns it.
             fixed: the one with u_0 fixed where Q(s, a) is learned, else `machine`.
             functions: the plant and its cost, compiled.
         """
         code, nmpc, learner = load("loop", TEXTS, NOTICE), trainer.nmpc, trainer.learner
-        problem, given_action = machine.arguments, fixed.arguments
-        place = fixed.place if trainer.constrained else 0
-        least, most = moves.projection or learner.bounds or (-np.inf, np.inf)
-        d, rule = trainer.weights.theta.size, code.SEMI_GRADIENT
-        slopes, *network = code.absent
-        if moves.beta is not None:
-            rule = code.EXACT if moves.curvature else code.GRADIENT_TD
-        if moves.curvature:
-            slopes = machine.slopes
-        self._machine, self._nmpc, self._episode = machine, nmpc, code.episode
-        self._valued = learner.bootstrap
+        self._code, self._machine, self._nmpc, self._valued = code, machine, nmpc, learner.bootstrap
+        (slopes, *network), rule, beta = code.absent, code.loop.SEMI_GRADIENT, 0.0
+        if isinstance(step, GradientTD):
+            rule, beta = code.loop.GRADIENT_TD, step.beta
+            if step.curved:
+                rule, slopes = code.loop.EXACT, machine.slopes
         if isinstance(self._valued, Imitation):
             network = machine_code().entries
+        place = fixed.place if trainer.constrained else 0
         next_input = int(nmpc.ocp.inputs[min(1, nmpc.horizon - 1)][0])
+        theta = trainer.weights.theta
+        bounds = (np.full_like(theta, one) for one in learner.bounds or (-np.inf, np.inf))
         self._given = (
-            machine.code, slopes, *functions, *network, tuple(problem), tuple(given_action),
+            machine.code, slopes, *functions, *network,
+            tuple(machine.arguments), tuple(fixed.arguments),
             machine.others, machine.drawn, machine.tolerance,
-            place, next_input, nmpc.farthest, nmpc.largest,
-            rule, moves.alpha, moves.beta or 0.0, np.full(d, least), np.full(d, most),
+            place, next_input, nmpc.farthest, nmpc.largest, rule, step.alpha, beta, *bounds,
         )  # fmt: skip
         self._how = trainer.constrained, trainer.clipped
         self._size = 2 * nmpc.ocp.lower.size + nmpc.ocp.equality.size  # z, lam and nu
 
     @classmethod
     def of(cls, trainer: Trainer) -> "Loop | None":
-        """None where a part is none of those that it knows, or cannot be compiled."""
+        """The loop of a trainer; None where it does not know a part, or cannot compile one."""
         learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
-        valued = learner.bootstrap
-        moves = Moves(0.0) if valued is nothing else getattr(learner.rule, "moves", None)
-        if not (_known(valued, nmpc) and moves and plant and type(learner) is Learner):
+        if trainer.controller is not nmpc or type(nmpc) is not Nmpc or type(learner) is not Learner:
             return None
-        if trainer.controller is not nmpc or type(nmpc) is not Nmpc:
-            return None
-        if {learner.gamma, moves.gamma or learner.gamma} != {nmpc.gamma} or (
-            learner.bounds and moves.projection
-        ):
+        step = _known_step(learner, nmpc)
+        if not (step and plant and _known(learner.bootstrap, nmpc)) or learner.gamma != nmpc.gamma:
             return None
         machine = nmpc.machine(fix_action=False)
         fixed = nmpc.machine(fix_action=True) if trainer.constrained else machine
         if machine is None or fixed is None:
             return None
         assert nmpc.task  # or the environment would be no plant
-        step, cost = plant.transition, nmpc.task.charge(nmpc.m)
+        cost = nmpc.task.charge(nmpc.m)
         try:
-            functions = compiled(step, returned=False), compiled(cost, returned=True)
-            return cls(trainer, moves, machine, fixed, *functions)
+            functions = compiled(plant.transition, returned=False), compiled(cost, returned=True)
+            return cls(trainer, step, machine, fixed, *functions)
         except CannotCompile:
             return None
 
@@ -228,7 +209,7 @@ class Loop:
             start = Start.SAME if warm.state.tolist() == state.tolist() else Start.SHIFTED
             point[:] = self._machine.point_of(warm)
         state, theta, w = state.copy(), weights.theta.copy(), weights.w.copy()
-        done = self._episode(
+        done = self._code.episode(
             *self._given, *self._bootstrap(len(rows) - first), *self._how, int(start), first,
             state, theta, w, point, noise, rows,
         )  # fmt: skip
@@ -240,16 +221,24 @@ class Loop:
 
     def _bootstrap(self, steps: int) -> tuple[Any, ...]:
         """The kind of the bootstrap, its network and target, with room for so many steps."""
-        valued = self._valued
+        valued, kinds = self._valued, self._code.loop
         if not isinstance(valued, Imitation):
-            kind = NOTHING if valued is nothing else SECOND_SOLVE
+            kind = kinds.NOTHING if valued is nothing else kinds.SECOND_SOLVE
             return kind, NO_NETWORK, NO_NETWORK, (False, False, False, 0, 0, 0.0)
         valued.network.reserve(steps)
         net, target = valued.network.net, valued.target
-        how = valued.with_theta, valued.gated, valued.late, valued.fits
-        if target is None:
-            return NETWORK, net, net, (*how, 0, 0.0)
-        return NETWORK, net, target.net, (*how, target.every, float(target.rate))
+        predicts, every, rate = (target.net, target.every, target.rate) if target else (net, 0, 0.0)
+        how = valued.with_theta, valued.gated, valued.late, valued.fits, every, float(rate)
+        return kinds.NETWORK, net, predicts, how
+
+
+def _known_step(learner: Learner, nmpc: Nmpc) -> SemiGradient | GradientTD | None:
+    """The step of a learner where the loop knows it; one that never learns has step size 0."""
+    step: Any = SemiGradient(0.0) if learner.bootstrap is nothing else learner.rule.step
+    if type(step) is GradientTD:
+        own = step.follow is auxiliary_step and (step.curved is None or step.curved is nmpc)
+        return step if own and step.gamma == nmpc.gamma else None
+    return step if type(step) is SemiGradient else None
 
 
 def _known(valued: Any, nmpc: Nmpc) -> bool:

@@ -16,7 +16,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.control.derivatives import StageDerivatives
 from nmpcrl.learning.bootstrap import Transition
-from nmpcrl.learning.learners import Learner, UpdateRule, Weights, theta_bounds
+from nmpcrl.learning.learners import Learner, UpdateRule, Weights
 from nmpcrl.learning.optimisers import Bounds, Optimiser
 from nmpcrl.learning.policy_gradient import no_successor
 
@@ -27,7 +27,6 @@ class Sensitivities(NamedTuple):
     states: Matrix  # ds / dtheta, shape (n, d)
     gradient: Vector  # of J, so far, shape (d,)
     curvature: Matrix  # shape (d, d)
-    optimiser: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,25 +42,22 @@ class ClosedLoop:
     derivatives: StageDerivatives
 
     def init(self, weights: Weights) -> Sensitivities:
-        """The start does not depend on theta."""
-        return self._begun(weights.theta.size, self.optimiser.init(weights.theta))
-
-    def _begun(self, d: int, optimiser: Any) -> Sensitivities:
-        return Sensitivities(np.zeros((self.nmpc.n, d)), np.zeros(d), np.zeros((d, d)), optimiser)
+        """None yet: the start does not depend on theta."""
+        d = weights.theta.size
+        return Sensitivities(np.zeros((self.nmpc.n, d)), np.zeros(d), np.zeros((d, d)))
 
     def step(
         self, theta: Vector, memory: Sensitivities, transition: Transition, *_: Any
     ) -> tuple[Vector, Sensitivities]:
         """Carry the sensitivities on; move theta where the episode is over."""
         if transition.first:  # the one before may have ended in a failed solve
-            memory = self._begun(theta.size, memory.optimiser)
+            memory = self.init(Weights(theta))
         model, cost, bends = self.derivatives(transition.solution, transition.action)
         y = np.vstack([memory.states, self.action_jacobian(transition, memory.states)])
         gradient, curvature = memory.gradient + cost @ y, memory.curvature + y.T @ bends @ y
         if transition.last:
-            moved, after = self.optimiser.step(theta, memory.optimiser, gradient, curvature)
-            return moved, self._begun(theta.size, after)
-        return theta, Sensitivities(model @ y, gradient, curvature, memory.optimiser)
+            theta = self.optimiser(theta, gradient, curvature)
+        return theta, Sensitivities(model @ y, gradient, curvature)
 
     def action_jacobian(self, transition: Transition, states: Matrix) -> Matrix:
         """da / dtheta, shape (m, d): 0 where noise took the action to its bound."""
@@ -81,13 +77,9 @@ def closed_loop(
 
     Args:
         nmpc: its model stands for the plant.
-        optimiser: `TrustRegion`, or another that takes a curvature.
+        optimiser: such as `TrustRegion`.
         bounds: the least and the largest theta; those of a `Problem` if absent.
-        cost: of the environment, (x, u) -> l in SX; of a task it is Eq. (20).
-
-    Raises:
-        ValueError: the `Nmpc` is of a `Problem`, and there is no cost.
+        cost: of the environment, (x, u) -> l in SX, which a `Problem` needs; of a task, Eq. (20).
     """
     own = ClosedLoop(nmpc, optimiser, StageDerivatives(nmpc, cost))
-    rule = UpdateRule(own.step, own.init)
-    return Learner("GN-J", no_successor, rule, nmpc.gamma, bounds or theta_bounds(nmpc))
+    return Learner.of("GN-J", nmpc, UpdateRule(own.step, own.init), no_successor, bounds)

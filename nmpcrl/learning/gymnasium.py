@@ -13,23 +13,12 @@ if TYPE_CHECKING:
 
 
 def as_gymnasium(
-    nmpc: Nmpc,
-    *,
-    plant: Any = None,
-    start: Any = None,
-    steps: int | None = None,
+    nmpc: Nmpc, *, plant: Any = None, start: Any = None, steps: int | None = None
 ) -> "Env[Vector, Vector]":
     """The environment of an NMPC as a `gymnasium.Env`, whose reward is minus the cost.
 
-    Args:
-        nmpc: has the bounds of the actions, and where it has a task its start and its cost.
-        plant: as in `train`.
-        start: as in `train`.
-        steps: after so many an episode is truncated; by nothing but the plant if absent.
-
-    Raises:
-        ImportError: Gymnasium is not installed; the extra `nmpcrl[gymnasium]` has it.
-        ValueError: there is no environment, as in `train`.
+    `plant` and `start` are those of `train`; after `steps` an episode is truncated. Gymnasium comes
+    with the extra `nmpcrl[gymnasium]`.
     """
     import gymnasium
 

@@ -11,7 +11,7 @@
 | LSTD-Q  | a second solve    | a Gauss-Newton step of a batch             |
 | DPG     | none              | the policy's gradient, from a batch        |
 
-LSTD-Q is in `batches`, DPG in `policy_gradient`, and the control arms are in `baselines`.
+LSTD-Q is in `batches`, DPG in `policy_gradient`; `baselines` has what they are compared with.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,6 @@ from nmpcrl.learning.bootstrap import (
     Bootstrap,
     Controller,
     Imitation,
-    Moves,
     NextValue,
     SecondSolve,
     Transition,
@@ -44,8 +43,7 @@ from nmpcrl.learning.updates import (
 if TYPE_CHECKING:
     from nmpcrl.learning.network import QNetwork
 
-
-Follow = Callable[[Vector, float, Vector], Vector]  # (w, delta, phi) -> the next w
+Move = Callable[..., tuple[Vector, Any]]  # the step of an `UpdateRule`
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,17 +85,17 @@ class UpdateRule:
     # (theta, memory) -> the same, after an episode that a failed solve ended, perhaps at once
     interrupted: Callable[[Vector, Any], tuple[Vector, Any]] = unchanged
 
-    @property
-    def moves(self) -> Moves | None:
-        """How `loop` knows the step, where it is built in."""
-        return getattr(self.step, "moves", None)
 
+@dataclass(frozen=True)
+class SemiGradient:
+    """The step of Eq. (9), along delta phi."""
 
-def built_in(moves: Moves, step: Callable[..., Any], *first: Any) -> partial[Any]:
-    """A step with its first arguments, which `loop` knows."""
-    known = partial(step, *first)
-    vars(known)["moves"] = moves
-    return known
+    alpha: float
+
+    def __call__(
+        self, theta: Vector, memory: Any, transition: Transition, delta: float, _: NextValue
+    ) -> tuple[Vector, Any]:
+        return semi_gradient_step(theta, delta, transition.solution.features, self.alpha), memory
 
 
 class Auxiliary(NamedTuple):
@@ -111,14 +109,42 @@ def first_w(weights: Weights) -> Auxiliary:
     return Auxiliary(weights.w)
 
 
-def projected(rule: UpdateRule, bounds: tuple[Any, Any]) -> UpdateRule:
-    """A rule whose theta is projected into bounds, (least, most), after each step."""
-    return UpdateRule(partial(_projected, rule, bounds), rule.init, rule.interrupted)
+@dataclass(frozen=True, eq=False)
+class GradientTD:
+    """The step of Eq. (16), of theta and w, both from the old ones."""
+
+    alpha: float  # step size of theta
+    beta: float  # of w
+    gamma: float
+    curved: Controller | None = None  # knows the Hessian, for the term that Eq. (16) drops
+    follow: Callable[[Vector, float, Vector, float], Vector] = auxiliary_step  # moves w
+
+    def __call__(
+        self, theta: Vector, memory: Auxiliary, transition: Transition, delta: float,
+        successor: NextValue,
+    ) -> tuple[Vector, Auxiliary]:  # fmt: skip
+        if successor.features is None:
+            raise ValueError(
+                "gradient TD needs the next state's features: bootstrap by SecondSolve"
+            )
+        (w,), phi, alpha = memory, transition.solution.features, self.alpha
+        theta = gradient_td_step(
+            theta, w, delta, phi, successor.features, alpha=alpha, gamma=self.gamma
+        )
+        if self.curved:
+            hessian_w = self.curved.value_hessian_times(transition.solution, w)
+            theta = theta - alpha * curvature_correction(delta, phi, w, hessian_w)
+        return theta, Auxiliary(self.follow(w, delta, phi, self.beta))
 
 
-def _projected(rule: UpdateRule, bounds: tuple[Any, Any], *given: Any) -> tuple[Vector, Any]:
-    theta, memory = rule.step(*given)
-    return project(theta, *bounds), memory
+def semi_gradient(alpha: float) -> UpdateRule:
+    """Eq. (9): move theta along delta phi."""
+    return UpdateRule(SemiGradient(alpha))
+
+
+def gradient_td(alpha: float, beta: float, gamma: float, **options: Any) -> UpdateRule:
+    """Eq. (16): move theta and w, both from the old ones; `options` are those of `GradientTD`."""
+    return UpdateRule(GradientTD(alpha, beta, gamma, **options), first_w)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +156,17 @@ class Update:
     delta: float | None = None  # TD error; None likewise, and the weights are unchanged
 
 
+def theta_bounds(nmpc: Any) -> Bounds | None:
+    """The bounds of a `Problem`'s theta; None where there is no problem, or nothing is bounded."""
+    problem = getattr(nmpc, "problem", None)
+    if problem is None or not np.isfinite([problem.theta_lower, problem.theta_upper]).any():
+        return None
+    return problem.theta_lower, problem.theta_upper
+
+
 @dataclass(frozen=True)
 class Learner:
-    """A bootstrap and an update rule; a step is pure but for a network or generator they hold."""
+    """A bootstrap and an update rule; a step is pure but for their network or generator."""
 
     name: str  # as tables show it
     bootstrap: Bootstrap  # values the next state
@@ -146,6 +180,15 @@ class Learner:
             raise ValueError(f"rule = {self.rule!r} must be an UpdateRule: write UpdateRule(step),"
                              " with step(theta, memory, transition, delta, successor) -> (theta,"
                              " memory)")  # fmt: skip
+
+    @classmethod
+    def of(
+        cls, name: str, nmpc: Controller, rule: UpdateRule, bootstrap: Bootstrap | None = None,
+        bounds: Bounds | None = None, **options: Any,
+    ) -> "Learner":  # fmt: skip
+        """A learner with the gamma and the bounds of an NMPC; its bootstrap is a second solve."""
+        bounds = bounds or theta_bounds(nmpc)
+        return cls(name, bootstrap or SecondSolve(nmpc), rule, nmpc.gamma, bounds, **options)
 
     def step(self, weights: Weights, transition: Transition) -> Update:
         """Value the next state, form the TD error, and move the weights.
@@ -170,10 +213,17 @@ class Learner:
     @cached_property
     def bounded_rule(self) -> UpdateRule:
         """The rule, with the projection into the bounds where there are any."""
-        return self.rule if self.bounds is None else projected(self.rule, self.bounds)
+        if self.bounds is None:
+            return self.rule
+        return replace(self.rule, step=partial(_projected, self.rule.step, self.bounds))
 
     def _memory(self, weights: Weights) -> Any:
         return self.rule.init(weights) if weights.memory is None else weights.memory
+
+
+def _projected(step: Move, bounds: Bounds, *given: Any) -> tuple[Vector, Any]:
+    theta, memory = step(*given)
+    return project(theta, *bounds), memory
 
 
 def weights_after(before: Weights, theta: Vector, memory: Any) -> Weights:
@@ -184,72 +234,12 @@ def weights_after(before: Weights, theta: Vector, memory: Any) -> Weights:
     return Weights(theta, before.w if found is None else found.w, memory)
 
 
-def theta_bounds(nmpc: Any) -> Bounds | None:
-    """The bounds of a `Problem`'s theta; None where there is no problem, or nothing is bounded."""
-    problem = getattr(nmpc, "problem", None)
-    if problem is None or not np.isfinite([problem.theta_lower, problem.theta_upper]).any():
-        return None
-    return problem.theta_lower, problem.theta_upper
-
-
-def semi_gradient(alpha: float) -> UpdateRule:
-    """Eq. (9): move theta along delta phi."""
-    return UpdateRule(built_in(Moves(alpha), _semi_gradient, alpha))
-
-
-def _semi_gradient(
-    alpha: float, theta: Vector, memory: Any, transition: Transition, delta: float, _: NextValue
-) -> tuple[Vector, Any]:
-    return semi_gradient_step(theta, delta, transition.solution.features, alpha), memory
-
-
-def gradient_td(alpha: float, beta: float, gamma: float) -> UpdateRule:
-    """Eq. (16): move theta and w, both from the old ones."""
-    step = partial(_gradient_td, alpha, gamma, partial(auxiliary_step, beta=beta))
-    return UpdateRule(built_in(Moves(alpha, beta, gamma), step), first_w)
-
-
-def tracking(alpha: float, gamma: float, follow: Follow) -> UpdateRule:
-    """Gradient TD with another step of w."""
-    return UpdateRule(partial(_gradient_td, alpha, gamma, follow), first_w)
-
-
-def _gradient_td(
-    alpha: float, gamma: float, follow: Follow,
-    theta: Vector, memory: Auxiliary, transition: Transition, delta: float, successor: NextValue,
-) -> tuple[Vector, Auxiliary]:  # fmt: skip
-    if successor.features is None:
-        raise ValueError("gradient TD needs the next state's features: bootstrap by SecondSolve")
-    (w,), phi = memory, transition.solution.features
-    theta = gradient_td_step(theta, w, delta, phi, successor.features, alpha=alpha, gamma=gamma)
-    return theta, Auxiliary(follow(w, delta, phi))
-
-
-def _curved(
-    rule: UpdateRule, nmpc: Controller, alpha: float,
-    theta: Vector, memory: Auxiliary, transition: Transition, delta: float, successor: NextValue,
-) -> tuple[Vector, Auxiliary]:  # fmt: skip
-    """A step of gradient TD less alpha h, the curvature that Eq. (16) drops."""
-    moved, after = rule.step(theta, memory, transition, delta, successor)
-    hessian_w = nmpc.value_hessian_times(transition.solution, memory.w)
-    phi = transition.solution.features
-    return moved - alpha * curvature_correction(delta, phi, memory.w, hessian_w), after
-
-
-def two_solves(
-    name: str, nmpc: Controller, rule: UpdateRule, bounds: Bounds | None = None, **options: Any
-) -> Learner:
-    """A learner whose bootstrap is a second solve, within the bounds of a `Problem` if any."""
-    bounds = bounds or theta_bounds(nmpc)
-    return Learner(name, SecondSolve(nmpc), rule, nmpc.gamma, bounds, **options)
-
-
 def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
     """ES: two solves a step, Eq. (7), and a semi-gradient, Eq. (9).
 
     Source: Moradimaryamnegari et al. (2022).
     """
-    return two_solves("ES", nmpc, semi_gradient(alpha))
+    return Learner.of("ES", nmpc, semi_gradient(alpha))
 
 
 def deep_expected_sarsa(
@@ -259,7 +249,8 @@ def deep_expected_sarsa(
 
     `options` are those of `Imitation`.
     """
-    return _imitating("DES", nmpc, Imitation(network, with_theta=False, **options), alpha)
+    imitation = Imitation(network, with_theta=False, **options)
+    return Learner.of("DES", nmpc, semi_gradient(alpha), imitation)
 
 
 def regularized_deep_expected_sarsa(
@@ -269,16 +260,13 @@ def regularized_deep_expected_sarsa(
 
     Eqs. (9), (10) and (11); `options` are those of `Imitation`.
     """
-    return _imitating("RDES", nmpc, Imitation(network, with_theta=True, **options), alpha)
-
-
-def _imitating(name: str, nmpc: Controller, bootstrap: Imitation, alpha: float) -> Learner:
-    return Learner(name, bootstrap, semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
+    imitation = Imitation(network, with_theta=True, **options)
+    return Learner.of("RDES", nmpc, semi_gradient(alpha), imitation)
 
 
 def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:
     """GES, the paper's second method: two solves a step, Eq. (7), and gradient TD, Eq. (16)."""
-    return two_solves("GES", nmpc, gradient_td(alpha, beta, nmpc.gamma))
+    return Learner.of("GES", nmpc, gradient_td(alpha, beta, nmpc.gamma))
 
 
 def gradient_tdc(
@@ -296,15 +284,11 @@ def gradient_tdc(
         alpha: step size of theta.
         beta: step size of w.
         curvature: whether to subtract alpha h, `curvature_correction`, a product with the Hessian.
-        projection: least and largest value of a component of theta; None for no projection.
+        projection: the least and the largest component of theta; the bounds of a `Problem` if
+            absent.
     """
-    rule = gradient_td(alpha, beta, nmpc.gamma)
-    if curvature:
-        rule = replace(rule, step=partial(_curved, rule, nmpc, alpha))
-    if projection:
-        rule = projected(rule, projection)
-    moves = Moves(alpha, beta, nmpc.gamma, curvature, projection)
-    return two_solves("TDC", nmpc, replace(rule, step=built_in(moves, rule.step)))
+    rule = gradient_td(alpha, beta, nmpc.gamma, curved=nmpc if curvature else None)
+    return Learner.of("TDC", nmpc, rule, bounds=projection)
 
 
 def q_learning(nmpc: Controller, alpha: float) -> Learner:
@@ -314,4 +298,4 @@ def q_learning(nmpc: Controller, alpha: float) -> Learner:
     `train` has it for this learner. In the next state the policy minimises Q, so its value is
     V_theta(s+): a solve with u_0 free.
     """
-    return two_solves("QL", nmpc, semi_gradient(alpha), values_actions=True)
+    return Learner.of("QL", nmpc, semi_gradient(alpha), values_actions=True)

@@ -11,24 +11,13 @@ from numba import float64, int64, njit, types, void
 
 from nmpcrl.control.solvers.codes import End, Start
 
+from . import updates
 from .dense import ENTRIES, NET
-from .updates import (
-    auxiliary_step,
-    curvature_correction,
-    dot,
-    gradient_td_step,
-    project,
-    semi_gradient_step,
-    td_error,
-)
 
 SHIFTED, SAME = int(Start.SHIFTED), int(Start.SAME)
 SOLVED = int(End.SOLVED)
 ABSURD = 1e24  # no value is larger
-NUMBERS = (  # that a row of an episode begins with; state, action, features, theta and w follow
-    "cost", "value", "next_value", "delta", "loss", "restarts", "violation", "iterations", "solves",
-)  # fmt: skip
-COUNT = len(NUMBERS)
+COUNT = 9  # numbers that a row begins with, `episode.NUMBERS`
 
 SEMI_GRADIENT, GRADIENT_TD, EXACT = range(3)  # rules
 NOTHING, SECOND_SOLVE, NETWORK = range(3)  # values of the next state
@@ -54,29 +43,32 @@ SIGNATURE = int64(
 )  # fmt: skip
 
 
-def translated(function, **called):
-    """A function of `updates` for numba, which takes no argument behind a star.
+def translated(*names):
+    """Functions of `updates` for numba, which takes no argument behind a star.
 
-    `called` are compiled functions in the place of those that it calls.
+    Each may call those before it.
     """
-    code = function.__code__
-    count = code.co_argcount + code.co_kwonlyargcount
-    code = code.replace(co_argcount=count, co_kwonlyargcount=0)
-    return plain(FunctionType(code, function.__globals__ | called, function.__name__))
+    done: dict[str, object] = {}
+    for name in names:
+        function = getattr(updates, name)
+        code = function.__code__
+        count = code.co_argcount + code.co_kwonlyargcount
+        code = code.replace(co_argcount=count, co_kwonlyargcount=0)
+        done[name] = plain(FunctionType(code, function.__globals__ | done, name))
+    return done.values()
 
 
-_dot = translated(dot)
-_td_error = translated(td_error)
-_project = translated(project)
-_semi_gradient_step = translated(semi_gradient_step)
-_gradient_td_step = translated(gradient_td_step, dot=_dot)
-_auxiliary_step = translated(auxiliary_step, dot=_dot)
-_curvature_correction = translated(curvature_correction, dot=_dot)
+_, td_error, project, semi_gradient_step, gradient_td_step, auxiliary_step, curvature_correction = (
+    translated(
+        "dot", "td_error", "project", "semi_gradient_step", "gradient_td_step", "auxiliary_step",
+        "curvature_correction",
+    )
+)  # fmt: skip
 
 
 @plain
 def copy(numbers, there):
-    """Write numbers there: shapes are not looked at, which a browser could not complain of."""
+    """Copy numbers without a check of shapes, for which a browser has no error."""
     for k in range(len(numbers)):
         there[k] = numbers[k]
 
@@ -101,7 +93,7 @@ def start_in(state, warm):
 
 @plain
 def carried(old, place, count, new):
-    """Copy a solution, with `count` more multipliers at `place`, or -`count` of them left out."""
+    """Copy a solution, with `count` more multipliers at `place`, or -`count` fewer."""
     copy(old[:place], new)
     for k in range(place, place + count):
         new[k] = 0.0
@@ -110,19 +102,19 @@ def carried(old, place, count, new):
 
 @plain
 def move(rule, theta, w, delta, phi, phi_next, product, alpha, beta, gamma):
-    """The next theta; w moves in place, and `product` is that of the Hessian with w."""
+    """The next theta; w moves in place, and `product` is the Hessian times w."""
     if rule == SEMI_GRADIENT:
-        return _semi_gradient_step(theta, delta, phi, alpha)
-    moved = _gradient_td_step(theta, w, delta, phi, phi_next, alpha, gamma)
+        return semi_gradient_step(theta, delta, phi, alpha)
+    moved = gradient_td_step(theta, w, delta, phi, phi_next, alpha, gamma)
     if rule == EXACT:
-        moved = moved - alpha * _curvature_correction(delta, phi, w, product)
-    copy(_auxiliary_step(w, delta, phi, beta), w)
+        moved = moved - alpha * curvature_correction(delta, phi, w, product)
+    copy(auxiliary_step(w, delta, phi, beta), w)
     return moved
 
 
 @plain
 def imitated(remember, fit, predict, follow, net, target, imitation, example, value, query):
-    """The value of `query`, the loss, and whether they count, as `Imitation` has them."""
+    """The value of `query`, the loss, and whether they count, as in `Imitation`."""
     _, gated, late, fits, every, rate = imitation
     found, loss = np.full(1, np.nan), np.nan
     by = target if every > 0 else net
@@ -146,73 +138,42 @@ def no_slopes(
     data, lower, upper, sides, kind, discount, weights, tie,
     state, theta, action, fixed, solved, w, of_states, of_inputs, out,
 ):  # fmt: skip
-    """For learners other than `EXACT`, so that no derivatives are compiled."""
     return False
 
 
-def no_remember(net, inputs, target):
-    """For learners without a network, as are the next three."""
-
-
-def no_fit(net):
-    return np.nan
-
-
-def no_predict(net, inputs, values):
-    pass
-
-
-def no_follow(target, net, every, rate):
-    pass
-
-
-ABSENT = (no_slopes, no_remember, no_fit, no_predict, no_follow)
+ABSENT = (  # for learners without an exact rule, or without a network
+    no_slopes,
+    lambda net, inputs, target: None,
+    lambda net: np.nan,
+    lambda net, inputs, values: None,
+    lambda target, net, every, rate: None,
+)
 
 
 def episode(
-    find, slopes, transition, charge, remember, fit, predict, follow,
-    problem, given_action, others, drawn, tolerance, place, next_input, farthest, largest,
-    rule, alpha, beta, least, most, bootstrap, net, target, imitation,
-    constrained, clipped, start, first, state, theta, w, warm, noise, rows,
+    find, slopes,  # of the plant's solver, and its derivatives, which `EXACT` calls
+    transition, charge,  # of the environment: x, u -> x+; x, u, data of stage 0 -> cost
+    remember, fit, predict, follow,  # of `dense`
+    problem, given_action,  # `riccati.Arguments` where u_0 is free, and where it is given
+    others, drawn, tolerance,  # as in `find`
+    place, next_input,  # where the multipliers of a given u_0 begin in a solution, and where u_1
+    farthest, largest,  # numbers of a state in which a plan may begin, and of theta and w
+    rule, alpha, beta,  # `SEMI_GRADIENT`, `GRADIENT_TD` or `EXACT`; step sizes of theta and w
+    least, most,  # bounds of theta, (d,)
+    bootstrap,  # `NOTHING`, which learns nothing, `SECOND_SOLVE` or `NETWORK`
+    net, target,  # the network that learns, and the one that predicts, as in `dense`
+    imitation,  # with_theta, gated, late, fits of `Imitation`; every and rate of `Target`, or 0
+    constrained, clipped,  # whether Q(s, a) is learned, and whether actions keep to the bounds
+    start, first,  # the `Start` of the first solve, and the first step
+    state, theta, w,  # (n,), (d,) and (d,), which are left as after the last step; so is `warm`
+    warm,  # z, lam and nu, u_0 being free, with which the first solve begins
+    noise,  # of every step, scaled, (steps, m)
+    rows,  # of every step `NUMBERS`, state, action, features, and theta and w after it
 ):  # fmt: skip
     """The steps first, first + 1, ... of an episode, as `train` makes them.
 
-    Args:
-        find: of the plant's solver.
-        slopes: its derivatives, which `EXACT` calls.
-        transition: x, u -> x+ of the environment.
-        charge: x, u, data of stage 0 -> its cost.
-        remember: of `dense`, as are `fit`, `predict` and `follow`.
-        problem: `riccati.Arguments`.
-        given_action: the same where u_0 is given.
-        others: cold starts, as in `find`, as are `drawn` and `tolerance`.
-        place: where the multipliers of a given u_0 begin in a solution.
-        next_input: where u_1 is in a solution.
-        farthest: the largest number of a state in which a plan may begin.
-        largest: the largest number of theta and w.
-        rule: `SEMI_GRADIENT`, `GRADIENT_TD` or `EXACT`.
-        alpha: step size of theta.
-        beta: step size of w.
-        least: bounds of theta, (d,), as is `most`.
-        bootstrap: `NOTHING`, which learns nothing, `SECOND_SOLVE` or `NETWORK`.
-        net: the network, as in `dense`.
-        target: what predicts in its place.
-        imitation: with_theta, gated and late of `Imitation`, its fits a step, and of `Target` every
-            and rate; every is 0 where there is no target.
-        constrained: whether Q(s, a) is learned.
-        clipped: whether actions are kept within the bounds.
-        start: the `Start` of the first solve.
-        first: the first step.
-        state: where it begins, (n,); this and the next three are left as the last step left them.
-        theta: parameters, (d,).
-        w: auxiliary weights, (d,).
-        warm: z, lam and nu of the solution that the first solve begins with, u_0 being free.
-        noise: of every step, scaled, (steps, m).
-        rows: of every step `NUMBERS`, state, action, features, and theta and w after it.
-
-    Returns:
-        The first step that is not made. Behind it is the end of the episode, or weights with which
-        no solver can be called, or a step in which a solve failed or the plant ran away.
+    Returns the first step that is not made. Behind it is the end of the episode, or weights with
+    which no solver can be called, or a step in which a solve failed or the plant ran away.
     """
     n, m, d, split = len(state), noise.shape[1], len(theta), len(warm)
     plan, successor, solution = np.empty(split + d), np.empty(split + d), np.empty(split)
@@ -230,7 +191,7 @@ def episode(
             return t
         solves, phi, action = 1, plan[split:], plan[n : n + m] + noise[t]
         if clipped:
-            action = _project(action, problem[1], problem[2])  # departure E
+            action = project(action, problem[1], problem[2])  # departure E
         transition(state, action, later)
         cost = charge(state, action, problem[0][0])
         if not usable(later, farthest):
@@ -276,10 +237,10 @@ def episode(
                 np.concatenate((state, action, theta))[:inputs], value,
                 np.concatenate((later, solution[next_input : next_input + m], theta))[:inputs],
             )  # fmt: skip
-        delta = _td_error(cost, gamma, value, next_value)
+        delta = td_error(cost, gamma, value, next_value)
         if known:
             moved = move(rule, theta, w, delta, phi, successor[split:], product, alpha, beta, gamma)
-            copy(_project(moved, least, most), theta)
+            copy(project(moved, least, most), theta)
         numbers = (
             cost, value, next_value, delta, loss, restarts, violation, iterations, float(solves),
         )  # fmt: skip

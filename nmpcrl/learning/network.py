@@ -71,11 +71,7 @@ def _first_weights(inputs: int, hidden: int, seed: int) -> NDArray[np.float32]:
 
 @cache
 def machine_code() -> ModuleType:
-    """The functions of `dense`, compiled.
-
-    Raises:
-        CannotCompile: numba is not installed.
-    """
+    """The functions of `dense`, compiled."""
     return load("network", {"__init__": COMPILED, "dense": TEXT}, NOTICE)
 
 
@@ -103,11 +99,7 @@ class Predictor:
         return values.reshape(inputs.shape[:-1])
 
     def _rows(self, inputs: Vector) -> Matrix:
-        """Inputs as a matrix with one row each.
-
-        Raises:
-            ValueError: they have another length than the network's.
-        """
+        """Inputs as a matrix with one row each."""
         length = len(self.net[SCALES]) - 1
         if inputs.shape[-1] != length:
             raise ValueError(f"inputs of length {inputs.shape[-1]} must have length {length}")
@@ -156,10 +148,8 @@ class QNetwork(Predictor):
             raise ValueError(f"memory = {memory} must hold at least a batch of {batch}")
         seed, draw = (int(rng.integers(2**63)) for _ in range(2))
         first = _first_weights(inputs, hidden, seed)
-        weights = np.zeros((4, len(first)), np.float32)
-        weights[0] = first
         self.net = (
-            weights,
+            np.stack([first, *np.zeros((3, len(first)), np.float32)]),
             np.zeros((capacity, inputs + 1), np.float32),
             np.zeros(capacity, np.int32),
             np.zeros(2, np.int64),
@@ -191,21 +181,13 @@ class QNetwork(Predictor):
         self.net = (weights, examples, order, counts, *rest)
 
     def remember(self, inputs: Vector, target: float) -> None:
-        """Store one example.
-
-        Raises:
-            ValueError: the inputs have another length than the network's.
-        """
+        """Store one example."""
         (row,) = self._rows(inputs)
         self.reserve(1)
         machine_code().remember(self.net, row, target)
 
     def fit(self) -> float:
-        """One Adam step on a mini-batch drawn without replacement; its loss before the step.
-
-        Raises:
-            ValueError: there are too few examples for a mini-batch.
-        """
+        """One Adam step on a mini-batch drawn without replacement; its loss before the step."""
         if not self.ready:
             batch = self.net[SIZES][1]
             raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
@@ -215,18 +197,11 @@ class QNetwork(Predictor):
 class Target(Predictor):
     """A copy of a network that predicts in its place, and follows it.
 
-    It begins with the network's first weights, as in Mnih et al. (2015), and every so many steps
-    goes a part of the way to its present ones.  # departure I
+    It begins with the network's first weights, as in Mnih et al. (2015).  # departure I
     """
 
     def __init__(self, network: QNetwork, *, every: int = 1, rate: float = 1.0) -> None:
-        """Copy the weights.
-
-        Args:
-            network: the network to follow.
-            every: how many calls of `follow` move the copy once.
-            rate: the part of the way; 1 for all of it.
-        """
+        """At each `every`-th call of `follow` it moves the part `rate` of the way to `network`."""
         weights, examples, order, counts, *rest = network.net
         empty = (examples[:0].copy(), order[:0].copy(), np.zeros_like(counts))
         self.net = (weights[:1].copy(), *empty, *rest)

@@ -1,11 +1,11 @@
 """The deterministic policy gradient of an NMPC, with a compatible critic.
 
 The policy is pi_theta(s) = u_0, and its Jacobian dpi / dtheta, shape (m, d), is exact. The critic
-is linear: V_v(s) = v' features(s), and A_w(s, a) = w' psi with psi = (dpi / dtheta)' (a - pi(s)),
-which is compatible: with it the gradient of the return is exact (Silver et al. 2014).
+is linear: V_v(s) = v'phi(s) with `monomials`, and A_w(s, a) = w'psi with
+psi = (dpi / dtheta)' (a - pi(s)), which is compatible: with it the gradient of the return is exact
+(Silver et al. 2014).
 """
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -14,22 +14,14 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.learning.batches import Statistics, batched
 from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
-from nmpcrl.learning.learners import Learner, theta_bounds
+from nmpcrl.learning.learners import Learner
 from nmpcrl.learning.optimisers import Bounds, Descent, Optimiser
-
-Features = Callable[[Vector], Vector]
 
 
 def monomials(state: Vector) -> Vector:
-    """1, s_i and s_i s_j, i <= j: the features of a quadratic value."""
+    """phi, of a quadratic value: 1, s_i and s_i s_j, i <= j."""
     rows, columns = np.triu_indices(state.size)
     return np.concatenate([[1.0], state, state[rows] * state[columns]])
-
-
-def compatible_features(policy_jacobian: Matrix, exploration: Vector) -> Vector:
-    """psi = (dpi / dtheta)' (a - pi(s)), shape (d,); Silver et al. (2014)."""
-    result: Vector = policy_jacobian.T @ exploration
-    return result
 
 
 class CriticMeans(NamedTuple):
@@ -70,43 +62,31 @@ def lstd_advantage(means: CriticMeans, v: Vector, regularisation: float) -> Vect
     return ridge(means.advantage_matrix, target, regularisation)
 
 
-def policy_gradient_estimate(fisher: Matrix, w: Vector) -> Vector:
-    """dJ / dtheta = mean((dpi / dtheta)' dpi / dtheta) w; Gros and Zanon (2020)."""
-    result: Vector = fisher @ w
-    return result
-
-
 def no_successor(transition: Transition, theta: Vector) -> NextValue:
     """The critic values states, so no value is taken from the NMPC."""
     return NextValue(np.nan)
 
 
-def policy_statistics(
-    nmpc: Controller, features: Features, transition: Transition, _: float
-) -> Statistics:
-    """What one step adds to `CriticMeans`.
-
-    Raises:
-        ValueError: u_0 was fixed, so that the solution has no policy.
-    """
+def policy_statistics(nmpc: Controller, transition: Transition, _: float) -> Statistics:
+    """What one step adds to `CriticMeans`; ValueError where u_0 was fixed: that is no policy."""
     solution = transition.solution
     if solution.ocp.fixed_action.size:
         raise ValueError(
             "a policy gradient needs the plan with u_0 free: call train without constrained"
         )
     jacobian = nmpc.policy_jacobian(solution)
-    phi = features(transition.state)
-    phi_next = np.zeros_like(phi) if transition.end else features(transition.next_state)
-    psi = compatible_features(jacobian, transition.action - solution.action)
+    phi = monomials(transition.state)
+    phi_next = np.zeros_like(phi) if transition.end else monomials(transition.next_state)
+    psi = jacobian.T @ (transition.action - solution.action)
     own = critic_statistics(phi, phi_next, psi, transition.cost, nmpc.gamma)
     return (*own, jacobian.T @ jacobian)
 
 
-def natural_statistics(regularisation: float, *found: Any) -> Statistics:
-    """The gradient, and the mean of dpi'dpi for a curvature, from `CriticMeans`."""
+def policy_gradient_estimate(regularisation: float, *found: Any) -> Statistics:
+    """dJ / dtheta = F w and F = mean((dpi / dtheta)' dpi / dtheta); Gros and Zanon (2020)."""
     means = CriticMeans(*found)
     w = lstd_advantage(means, lstd_value(means, regularisation), regularisation)
-    return policy_gradient_estimate(means.fisher, w), means.fisher
+    return means.fisher @ w, means.fisher
 
 
 def policy_gradient(
@@ -115,7 +95,6 @@ def policy_gradient(
     *,
     every: int | None = None,
     optimiser: Optimiser | None = None,
-    features: Features = monomials,
     regularisation: float = 1e-6,
     bounds: Bounds | None = None,
 ) -> Learner:
@@ -130,13 +109,12 @@ def policy_gradient(
         nmpc: the controller.
         alpha: step size.
         every: steps of a batch; those of an episode if absent.
-        optimiser: takes the gradient, and the mean of dpi'dpi for a curvature: `Adam`, or
-            `GaussNewton`, whose step is the natural gradient. `Descent(alpha)` if absent.
-        features: of the value; all monomials of the state up to degree 2 by default.
+        optimiser: of the gradient and the mean of dpi'dpi for a curvature, with which the step of
+            `GaussNewton` is the natural gradient. `Descent(alpha)` if absent.
         regularisation: of the two least-squares fits.
         bounds: the least and the largest theta; those of a `Problem` if absent.
     """
-    sample = partial(policy_statistics, nmpc, features)
-    estimate = partial(natural_statistics, regularisation)
+    estimate = partial(policy_gradient_estimate, regularisation)
+    sample = partial(policy_statistics, nmpc)
     rule = batched(sample, optimiser or Descent(alpha), every, estimate)
-    return Learner("DPG", no_successor, rule, nmpc.gamma, bounds or theta_bounds(nmpc))
+    return Learner.of("DPG", nmpc, rule, no_successor, bounds)

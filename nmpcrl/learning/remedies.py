@@ -19,16 +19,16 @@ from typing import Any, NamedTuple
 
 from nmpcrl import Vector
 from nmpcrl.learning.baselines import as_far_as
-from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
+from nmpcrl.learning.bootstrap import Controller, Transition
 from nmpcrl.learning.learners import (
     Learner,
+    Move,
     UpdateRule,
     Weights,
     first_w,
+    gradient_td,
     no_memory,
     semi_gradient,
-    tracking,
-    two_solves,
     weights_after,
 )
 from nmpcrl.learning.updates import auxiliary_step
@@ -61,14 +61,14 @@ def tdrc(nmpc: Controller, alpha: float, regularisation: float = REGULARISATION)
     Source: Ghiassian et al. (2020).  Their features are of unit size: where ||phi||^2 is large, a
     regularisation of 1 does next to nothing. On the two-state chain one above 2 gamma - 1 diverges.
     """
-    follow = partial(regularised_step, alpha=alpha, decay=regularisation)
-    return two_solves("TDRC", nmpc, tracking(alpha, nmpc.gamma, follow))
+    follow = partial(regularised_step, decay=regularisation)
+    return Learner.of("TDRC", nmpc, gradient_td(alpha, alpha, nmpc.gamma, follow=follow))
 
 
 def normalised_ges(nmpc: Controller, alpha: float, ratio: float = 3.0) -> Learner:
     """GES-3: w moves faster than theta, as two-time-scale theory asks, by `normalised_step`."""
-    follow = partial(normalised_step, beta=ratio * alpha)
-    return two_solves("GES-3", nmpc, tracking(alpha, nmpc.gamma, follow))
+    rule = gradient_td(alpha, ratio * alpha, nmpc.gamma, follow=normalised_step)
+    return Learner.of("GES-3", nmpc, rule)
 
 
 def guarded(learner: Learner, alpha: float) -> Learner:
@@ -78,14 +78,14 @@ def guarded(learner: Learner, alpha: float) -> Learner:
         ValueError: its rule is not proportional to alpha, since it moves theta by batches.
     """
     rule = _of_each_step(learner, "a guard")
-    own = UpdateRule(partial(_guarded, rule, alpha), rule.init, rule.interrupted)
+    own = replace(rule, step=partial(_guarded, rule.step, alpha))
     return replace(learner, name=f"{learner.name} guarded", rule=own)
 
 
 def _guarded(
-    rule: UpdateRule, alpha: float, theta: Vector, memory: Any, transition: Transition, *given: Any
+    step: Move, alpha: float, theta: Vector, memory: Any, transition: Transition, *given: Any
 ) -> tuple[Vector, Any]:
-    moved, after = rule.step(theta, memory, transition, *given)
+    moved, after = step(theta, memory, transition, *given)
     allowed = guard(alpha, transition.solution.features)
     return moved if allowed == alpha else theta + allowed / alpha * (moved - theta), after
 
@@ -112,33 +112,33 @@ class Mean(NamedTuple):
     inner: Any
 
 
+@dataclass(frozen=True, eq=False)
+class Averaging:
+    """The functions of a rule that remembers mean <- mean + (theta - mean) / n after some steps."""
+
+    rule: UpdateRule
+    skip: int  # steps until n = 1; before, the mean is theta
+
+    def init(self, weights: Weights) -> Mean:
+        return Mean(weights.theta, 0, self.rule.init(weights))
+
+    def step(self, theta: Vector, memory: Mean, *given: Any) -> tuple[Vector, Mean]:
+        theta, inner = self.rule.step(theta, memory.inner, *given)
+        steps = memory.steps + 1
+        part = 1 / max(steps - self.skip, 1)
+        return theta, Mean(memory.theta + part * (theta - memory.theta), steps, inner)
+
+    def interrupted(self, theta: Vector, memory: Mean) -> tuple[Vector, Mean]:
+        theta, inner = self.rule.interrupted(theta, memory.inner)
+        return theta, memory._replace(inner=inner)
+
+
 def averaged(learner: Learner, skip: int = 0) -> Learner:
     """A learner that remembers the mean of its theta after `skip` steps, for `judged_theta`.
 
     Source: Polyak and Juditsky (1992).
     """
-    rule = learner.bounded_rule
-    parts = (partial(_averaged, rule, skip), partial(_first_mean, rule), partial(_mean_of, rule))
-    return replace(learner, name=f"{learner.name} averaged", rule=UpdateRule(*parts))
-
-
-def _first_mean(rule: UpdateRule, weights: Weights) -> Mean:
-    return Mean(weights.theta, 0, rule.init(weights))
-
-
-def _averaged(
-    rule: UpdateRule, skip: int, theta: Vector, memory: Mean, *given: Any
-) -> tuple[Vector, Mean]:
-    """mean <- mean + (theta - mean) / n; until n = 1, the mean is theta."""
-    theta, inner = rule.step(theta, memory.inner, *given)
-    steps = memory.steps + 1
-    part = 1 / max(steps - skip, 1)
-    return theta, Mean(memory.theta + part * (theta - memory.theta), steps, inner)
-
-
-def _mean_of(rule: UpdateRule, theta: Vector, memory: Mean) -> tuple[Vector, Mean]:
-    theta, inner = rule.interrupted(theta, memory.inner)
-    return theta, memory._replace(inner=inner)
+    return _wrapped(learner, "averaged", Averaging(learner.bounded_rule, skip))
 
 
 class Best(NamedTuple):
@@ -164,19 +164,16 @@ class Undoing:
     every: int = 1  # episodes
 
     def init(self, weights: Weights) -> Best:
-        """The first rollout."""
         return Best(weights, self.confirm(weights.theta), 0, self.rule.init(weights))
 
     def step(
-        self, theta: Vector, memory: Best, transition: Transition, delta: float, then: NextValue
+        self, theta: Vector, memory: Best, transition: Transition, *given: Any
     ) -> tuple[Vector, Best]:
-        """Move as the rule does; judge theta at the end of an episode."""
-        theta, inner = self.rule.step(theta, memory.inner, transition, delta, then)
+        theta, inner = self.rule.step(theta, memory.inner, transition, *given)
         memory = memory._replace(inner=inner)
         return self._judged(theta, memory) if transition.last else (theta, memory)
 
     def interrupted(self, theta: Vector, memory: Best) -> tuple[Vector, Best]:
-        """As at the end of any other episode."""
         theta, inner = self.rule.interrupted(theta, memory.inner)
         return self._judged(theta, memory._replace(inner=inner))
 
@@ -194,9 +191,12 @@ class Undoing:
 
 def undo(learner: Learner, confirm: Callable[[Vector], float], every: int = 1) -> Learner:
     """A learner that takes back steps after which a rollout without noise costs more: `Undoing`."""
-    own = Undoing(learner.bounded_rule, confirm, every)
+    return _wrapped(learner, "undone", Undoing(learner.bounded_rule, confirm, every))
+
+
+def _wrapped(learner: Learner, how: str, own: Averaging | Undoing) -> Learner:
     rule = UpdateRule(own.step, own.init, own.interrupted)
-    return replace(learner, name=f"{learner.name} undone", rule=rule)
+    return replace(learner, name=f"{learner.name} {how}", rule=rule)
 
 
 def judged_theta(weights: Weights) -> Vector:

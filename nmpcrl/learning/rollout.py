@@ -1,19 +1,21 @@
 """The closed loop without noise, by which theta is judged."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Plant, SolverError
+from nmpcrl.control import Plant, SolverError
 from nmpcrl.learning.environment import (
     Data,
     GymnasiumEnv,
     StepFunction,
     environment,
     forecasts,
+    nmpc_of,
     ran_away,
+    stream,
 )
 
 
@@ -24,25 +26,12 @@ class Rollout:
     states: Matrix  # s_0, ..., s_K; fewer where it ended or failed, shape (<= K + 1, n)
     actions: Matrix  # shape (<= K + 1, m)
     costs: Vector  # RL stage costs, shape (<= K + 1,)
-    failure: str = field(default="")  # what the solver said, if it failed, or where the plant went
+    failure: str = ""  # what the solver said, if it failed, or where the plant went
 
     @property
     def cost(self) -> float:
         """Sum of the RL stage cost, t = 0, ..., K; infinite where the rollout failed."""
         return np.inf if self.failure else float(self.costs.sum())
-
-
-def nmpc_of(controller: Any) -> Nmpc | None:
-    """The `Nmpc` that a controller is or has among its attributes; None where there is none."""
-    near = [controller, *getattr(controller, "__dict__", {}).values()]
-    return next((one for one in near if isinstance(one, Nmpc)), None)
-
-
-def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
-    """A generator as it is; of an int one whose numbers `default_rng` of that int does not draw."""
-    if isinstance(rng, int | np.integer):
-        rng = np.random.SeedSequence(int(rng), spawn_key=(key,))  # type: ignore[assignment]
-    return np.random.default_rng(rng)
 
 
 def evaluate(
@@ -65,10 +54,7 @@ def evaluate(
             result has an `action`. One that holds an `Nmpc` has the environment of that by default.
         theta: NMPC parameters, shape (d,).
         steps: K + 1, the most states that are visited.
-        plant: the environment, as in `train`; the plant that plans if absent.
-        start: a state or rng -> state; the task's if absent.
-        data: of a `Problem` at each time, as in `train`.
-        rng: for a plant or a start that draws, as in `train`, with other numbers of the same int.
+        plant: as in `train`, like `start`, `data` and `rng`, of which an int gives other numbers.
     """
     nmpc, rng = nmpc_of(controller), stream(rng, 2)
     around = environment(nmpc, plant, start)
@@ -76,9 +62,8 @@ def evaluate(
     states, actions, costs = [], [], []
     ahead = forecasts(data, nmpc.horizon if nmpc else 0)
     for t in range(steps):
-        known = {"data": ahead(t)} if ahead else {}
         try:
-            plan = controller.solve(state.copy(), theta, plan, **known)
+            plan = controller.solve(state.copy(), theta, plan, **ahead(t))
         except SolverError as error:
             failure = str(error)
             break
@@ -91,8 +76,6 @@ def evaluate(
             break
     inputs = nmpc.m if nmpc else actions[0].size if actions else 0
     return Rollout(
-        states=np.reshape(states, (-1, state.size)),
-        actions=np.reshape(actions, (-1, inputs)),
-        costs=np.array(costs),
-        failure=failure,
-    )
+        np.reshape(states, (-1, state.size)), np.reshape(actions, (-1, inputs)), np.array(costs),
+        failure,
+    )  # fmt: skip

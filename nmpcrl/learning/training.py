@@ -1,6 +1,6 @@
 """Algorithm 1 as a generator of steps."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -9,24 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Plant, Solution, SolverError
+from nmpcrl.control import Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
-from nmpcrl.learning.bootstrap import Controller, Transition
+from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.environment import (
     Data,
-    Environment,
     GymnasiumEnv,
     StepFunction,
     environment,
     forecasts,
+    nmpc_of,
     ran_away,
+    stream,
 )
 from nmpcrl.learning.learners import Learner, Update, Weights
-from nmpcrl.learning.rollout import nmpc_of, stream
 
-Counts = NDArray[np.int_]
-Count = Callable[[int, int], Counts]  # (episodes, steps) -> k of each step
+Counts = NDArray[np.int_]  # k of each step, shape (episodes, steps)
 
 PATIENCE = 10  # so many episodes in a row that a failed solve ended are a divergence
 
@@ -63,9 +62,19 @@ class Step:
 
     @property
     def warm(self) -> Solution | None:
-        """What the next step's first solve begins with."""
+        """The warm start of the next step's first solve."""
         successor = self.update and self.update.successor
         return (successor and successor.solution) or self.solution
+
+
+def count_steps(episodes: int, steps: int) -> Counts:
+    """k of Eq. (5) read as written, the time step counted through training.  # departure C"""
+    return np.arange(episodes * steps).reshape(episodes, steps)
+
+
+def count_episodes(episodes: int, steps: int) -> Counts:
+    """k of Eq. (5) as Algorithm 1 uses it, the episode.  # departure C"""
+    return np.repeat(np.arange(episodes), steps).reshape(episodes, steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +100,7 @@ class Exploration:
         *,
         deviation: float = 1.0,
         decay_rate: float = 0.99,
-        count: Count | None = None,
+        count: Callable[[int, int], Counts] = count_steps,
     ) -> "Exploration":
         """Normal noise that decays.
 
@@ -100,15 +109,10 @@ class Exploration:
             shape: episodes, steps of an episode, inputs of the plant.
             deviation: standard deviation before the decay.
             decay_rate: c_epsilon.
-            count: k of Eq. (5): `count_steps`, the default, or `count_episodes`.
+            count: k of Eq. (5): `count_steps` or `count_episodes`.
         """
-        scale = decay_rate ** (count or count_steps)(*shape[:2])
+        scale = decay_rate ** count(*shape[:2])
         return cls(rng.normal(scale=deviation, size=shape), scale)
-
-    def __call__(self, policy: Vector, episode: int, time: int) -> Vector:
-        """The action before it is clipped to the action space."""
-        result: Vector = policy + self.scaled[episode, time]
-        return result
 
     @cached_property
     def scaled(self) -> Matrix:
@@ -116,28 +120,8 @@ class Exploration:
         return self.scale[..., None] * self.noise
 
 
-def count_steps(episodes: int, steps: int) -> Counts:
-    """k of Eq. (5) read as written, the time step counted through training.  # departure C"""
-    return np.arange(episodes * steps).reshape(episodes, steps)
-
-
-def count_episodes(episodes: int, steps: int) -> Counts:
-    """k of Eq. (5) as Algorithm 1 uses it, the episode.  # departure C"""
-    return np.repeat(np.arange(episodes), steps).reshape(episodes, steps)
-
-
 def train(
-    learner: Learner,
-    controller: Controller,
-    weights: Weights,
-    explore: Exploration,
-    *,
-    clipped: bool = True,
-    constrained: bool | None = None,
-    plant: Plant | StepFunction | GymnasiumEnv | None = None,
-    start: Any = None,
-    data: Data | None = None,
-    rng: np.random.Generator | int = 0,
+    learner: Learner, controller: Any, weights: Weights, explore: Exploration, **options: Any
 ) -> Iterator[Step]:
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
@@ -147,16 +131,16 @@ def train(
 
     Args:
         learner: moves the weights.
-        controller: acts, and is what is learned.
+        controller: acts, and is what is learned: an `Nmpc`, or an object that holds one and has
+            its `solve`.
         weights: to start with.
         explore: the noise.
-        clipped: whether actions are kept in the action space; they must be where Q(s, a) is solved
-            for and inputs have bounds.  # departure E
+        clipped: whether actions are kept in the action space, by default; they must be where
+            Q(s, a) is solved for and inputs have bounds.  # departure E
         constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s); what the learner
             is meant for if absent.  # departure F
-        plant: the environment, as in `environment`: a `Plant`, whose cost is the task's, a function
-            (state, action, rng) -> (next state, cost, end), or a `gymnasium.Env`; the plant that
-            plans if absent. The state in which an episode ends is worth 0.
+        plant: as in `environment`; the plant that plans if absent. The state in which an episode
+            ends is worth 0.
         start: a state, or a function rng -> state; the task's if absent.
         data: of a `Problem` at each time t of an episode: a function of t, that gives what
             `Nmpc.solve` takes; or by name an array over the episode, of which each plan sees its
@@ -169,95 +153,103 @@ def train(
             `Problem` without `plant` and `start`.
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
-    trainer = trainer_of(
-        learner, controller, weights, explore, clipped=clipped, constrained=constrained,
-        plant=plant, start=start, data=data, rng=rng,
-    )  # fmt: skip
-    return trainer.run()
+    trainer = Trainer(learner, controller, weights, explore, **options)
+    return trainer.run(trainer.episode)
 
 
-@dataclass(frozen=True, eq=False)
 class Trainer:
-    """What an episode needs, as in `train`."""
+    """Algorithm 1 with the arguments of `train`, which are checked."""
 
-    learner: Learner
-    controller: Any
-    nmpc: Nmpc
-    weights: Weights  # to start with
-    explore: Exploration
-    clipped: bool
-    constrained: bool
-    plant: Plant | None  # the environment, if it is one
-    environment: Environment
-    data: Callable[[int], Mapping[str, Any]] | None
-    rng: np.random.Generator
+    def __init__(
+        self,
+        learner: Learner,
+        controller: Any,
+        weights: Weights,
+        explore: Exploration,
+        *,
+        clipped: bool = True,
+        constrained: bool | None = None,
+        plant: Plant | StepFunction | GymnasiumEnv | None = None,
+        start: Any = None,
+        data: Data | None = None,
+        rng: np.random.Generator | int = 0,
+    ) -> None:
+        nmpc = nmpc_of(controller)
+        if nmpc is None:
+            raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
+        if not isinstance(weights, Weights):
+            raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta)")
+        if explore.noise.shape[2] != nmpc.m:
+            raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
+                             f" {nmpc.m} inputs")  # fmt: skip
+        constrained = learner.values_actions if constrained is None else constrained
+        if constrained and not clipped and np.isfinite([nmpc.lower, nmpc.upper]).any():
+            raise ValueError(
+                f"clipped = False lets actions leave {short(nmpc.lower)} and {short(nmpc.upper)},"
+                f" where {learner.name} has no Q(s, a): leave it out, or learn V(s) by"
+                " constrained=False"
+            )
+        self.learner, self.controller, self.nmpc, self.explore = learner, controller, nmpc, explore
+        self.weights = replace(
+            weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float)
+        )
+        self.clipped, self.constrained, self.rng = clipped, constrained, stream(rng, 1)
+        self.environment = environment(nmpc, plant, start)
+        self.ahead = forecasts(data, nmpc.horizon)  # the options of a solve at t
+        plant = nmpc.plant if plant is None else plant
+        self.plant = plant if isinstance(plant, Plant) else None  # the environment, if it is one
 
-    def run(self) -> Iterator[Step]:
-        """The steps of all episodes."""
+    def run(self, episode: Callable[[int, Weights], Iterator[Any]]) -> Iterator[Any]:
+        """What `episode` makes of each episode's number and first weights, one after another."""
         weights, failed = self.weights, 0
-        for episode in range(len(self.explore.scale)):
-            failure, state = "", self.environment.start(self.rng)
-            for step in self.steps(episode, 0, state, weights, None):
-                weights, failure = step.weights, step.failure
-                yield step
-                self.judge(weights)
-            failed = self.counted(failed, failure)
+        for number in range(len(self.explore.scale)):
+            failure = ""
+            for made in episode(number, weights):
+                weights, failure = made.weights, made.failure
+                yield made
+                left = absurd(weights, self.nmpc.largest)
+                if left:
+                    raise Diverged(f"{left} left the numbers that a solver is given")
+            failed = failed + 1 if failure else 0
+            if failed == PATIENCE:
+                raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
 
-    def judge(self, weights: Weights) -> None:
-        """Raise Diverged where no solver can be called with the weights."""
-        left = absurd(weights, self.nmpc.largest)
-        if left:
-            raise Diverged(f"{left} left the numbers that a solver is given")
-
-    def counted(self, failed: int, failure: str) -> int:
-        """How many episodes in a row failed, after another one; raises Diverged at `PATIENCE`."""
-        failed = failed + 1 if failure else 0
-        if failed == PATIENCE:
-            raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
-        return failed
+    def episode(self, number: int, weights: Weights) -> Iterator[Step]:
+        """The steps of an episode."""
+        return self.steps(number, 0, self.environment.start(self.rng), weights, None)
 
     def steps(
         self, episode: int, first: int, state: Vector, weights: Weights, warm: Solution | None
     ) -> Iterator[Step]:
         """The steps of an episode from the first on; the last one says so if a solve failed."""
-        controller, constrained = self.controller, self.constrained
-        nmpc, rng = self.nmpc, self.rng
-        nothing = np.full(nmpc.m, np.nan)
+        controller, nmpc, known = self.controller, self.nmpc, self.ahead(first)
         final = self.explore.scale.shape[1] - 1
-        ahead = self.data
-        known = ahead and ahead(first)
         for t in range(first, final + 1):
-            data = {} if known is None else {"data": known}
             try:
-                plan = controller.solve(state, weights.theta, warm, **data)
+                plan = controller.solve(state, weights.theta, warm, **known)
             except SolverError as error:
-                weights = self.learner.interrupted(weights)
-                yield Step(episode, t, state, weights, nothing, failure=str(error), last=True)
+                yield self._failed(error, episode, t, state, weights, np.full(nmpc.m, np.nan))
                 return
-            action = self.explore(plan.action, episode, t)
+            action = plan.action + self.explore.scaled[episode, t]
             action = nmpc.clip(action) if self.clipped else action  # departure E
-            next_state, cost, end, cut = self.environment.step(state, action, rng)
+            next_state, cost, end, cut = self.environment.step(state, action, self.rng)
+            found = (episode, t, state, weights, action, cost, plan)
             gone = ran_away(next_state, nmpc, end=end)
             if gone:
-                weights = self.learner.interrupted(weights)
-                yield Step(episode, t, state, weights, action, cost, plan, failure=gone, last=True)
+                yield self._failed(gone, *found)
                 return
-            last = end or cut or t == final
-            later = ahead(t + 1) if ahead and not end else None
-            solution = None
+            last, later = end or cut or t == final, {} if end else self.ahead(t + 1)
+            solution = None if self.constrained else plan
             try:
-                solution = (
-                    controller.solve(state, weights.theta, plan, action, **data)
-                    if constrained
-                    else plan
-                )
-                transition = Transition(state, action, cost, next_state, solution, end, last, later,
-                                        first=t == 0)  # fmt: skip
+                if solution is None:
+                    solution = controller.solve(state, weights.theta, plan, action, **known)
+                transition = Transition(
+                    state, action, cost, next_state, solution, end, last, later.get("data"),
+                    first=t == 0,
+                )  # fmt: skip
                 update = self.learner.step(weights, transition)
             except SolverError as error:
-                weights = self.learner.interrupted(weights)
-                what = (state, weights, action, cost, plan, solution)
-                yield Step(episode, t, *what, failure=str(error), last=True)
+                yield self._failed(error, *found, solution)
                 return
             weights = update.weights
             step = Step(
@@ -269,49 +261,12 @@ class Trainer:
                 return
             state, known, warm = next_state, later, step.warm
 
-
-def trainer_of(
-    learner: Learner,
-    controller: Controller,
-    weights: Weights,
-    explore: Exploration,
-    *,
-    clipped: bool = True,
-    constrained: bool | None = None,
-    plant: Plant | StepFunction | GymnasiumEnv | None = None,
-    start: Any = None,
-    data: Data | None = None,
-    rng: np.random.Generator | int = 0,
-) -> Trainer:
-    """The arguments of `train`, checked as it says."""
-    nmpc = nmpc_of(controller)
-    if nmpc is None:
-        raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
-    if not isinstance(weights, Weights):
-        raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta)")
-    if explore.noise.shape[2] != nmpc.m:
-        raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
-                         f" {nmpc.m} inputs")  # fmt: skip
-    fixed = learner.values_actions if constrained is None else constrained
-    if fixed and not clipped and np.isfinite([nmpc.lower, nmpc.upper]).any():
-        raise ValueError(
-            f"clipped = False lets actions leave {short(nmpc.lower)} and {short(nmpc.upper)}, where"
-            f" {learner.name} has no Q(s, a): leave it out, or learn V(s) by constrained=False"
-        )
-    around, known = environment(nmpc, plant, start), forecasts(data, nmpc.horizon)
-    return Trainer(
-        learner,
-        controller,
-        nmpc,
-        replace(weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float)),
-        explore,
-        clipped,
-        fixed,
-        (plant or nmpc.plant) if plant is None or isinstance(plant, Plant) else None,
-        around,
-        known,
-        stream(rng, 1),
-    )
+    def _failed(
+        self, why: Any, episode: int, t: int, state: Vector, weights: Weights, *found: Any
+    ) -> Step:
+        after = self.learner.interrupted(weights)
+        step = Step(episode, t, state, after, *found)
+        return replace(step, failure=str(why), last=True)
 
 
 def absurd(weights: Weights, largest: float = ABSURD) -> str:
@@ -320,7 +275,6 @@ def absurd(weights: Weights, largest: float = ABSURD) -> str:
     `largest` is that of the `Nmpc`; its default is that of every task's.
     """
     for name, vector in (("theta", weights.theta), ("w", weights.w)):
-        small = sum(map(abs, vector.tolist())) <= largest  # false for nan, and faster than NumPy
-        if not small and not (np.abs(vector) <= largest).all():
+        if not all(abs(number) <= largest for number in vector.tolist()):
             return f"{name} = {short(vector)}"
     return ""

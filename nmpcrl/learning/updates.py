@@ -26,15 +26,9 @@ def semi_gradient_step(theta: Vector, delta: float, phi: Vector, alpha: float) -
 
 
 def gradient_td_step(
-    theta: Vector,
-    w: Vector,
-    delta: float,
-    phi: Vector,
-    phi_next: Vector,
-    *,
-    alpha: float,
+    theta: Vector, w: Vector, delta: float, phi: Vector, phi_next: Vector, *, alpha: float,
     gamma: float,
-) -> Vector:
+) -> Vector:  # fmt: skip
     """theta of GES, the first line of Eq. (16); all vectors of shape (d,).
 
     As printed: without the curvature term of nonlinear TDC (Maei et al. 2009).  # departure K
@@ -50,11 +44,7 @@ def auxiliary_step(w: Vector, delta: float, phi: Vector, beta: float) -> Vector:
 def curvature_correction(delta: float, phi: Vector, w: Vector, hessian_w: Vector) -> Vector:
     """h of nonlinear TDC (Maei et al. 2009), which Eq. (16) drops, shape (d,).  # departure K
 
-    Args:
-        delta: TD error.
-        phi: gradient of Q_theta(s, a), shape (d,).
-        w: auxiliary weights, shape (d,).
-        hessian_w: the Hessian of Q_theta(s, a) in theta, times w, shape (d,).
+    `hessian_w` is the Hessian of Q_theta(s, a) in theta times w, shape (d,).
     """
     return (delta - dot(phi, w)) * hessian_w
 

@@ -11,7 +11,7 @@ from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning import Learner, Weights
 from nmpcrl.learning.episode import Loop
-from nmpcrl.learning.training import Exploration, trainer_of
+from nmpcrl.learning.training import Exploration, Trainer
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import DECAYS, LEARNERS, Generators
@@ -85,7 +85,7 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
     }
     for (*_, curved), experiment in kinds.items():
         job = job_of(replace(experiment, learner="TDC" if curved else "ES"))
-        Loop.of(trainer_of(job.learner, job.controller, job.weights, job.explore))
+        Loop.of(Trainer(job.learner, job.controller, job.weights, job.explore))
 
 
 def prepare(experiment: Experiment, controller: Nmpc) -> tuple[Learner, Weights, Exploration]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.control.content import NoContent, content
-from nmpcrl.learning import Adam, expected_sarsa
+from nmpcrl.learning import Descent, expected_sarsa
 from nmpcrl.study import paper
 
 GAIN = 2.0
@@ -52,7 +52,7 @@ def functions(text):
         (np.zeros(2), np.zeros(3)),
         (closing(1.0), closing(2.0)),
         (partial(expected_sarsa, alpha=1e-7), partial(expected_sarsa, alpha=1e-6)),
-        (Adam(0.1), Adam(0.2)),
+        (Descent(0.1), Descent(0.2)),
         (Rule(1.0), Rule(2.0)),
         (paper.nmpc("A"), paper.nmpc("B")),
         (*functions("f, g = (lambda x: x + 1), (lambda x: x + 2)").values(),)[-2:],

@@ -4,23 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from learning.small_runs import differences, noise, run
+from learning.small_runs import noise, run
 
 from nmpcrl.learning import (
-    Adam,
     Descent,
     Learner,
     SecondSolve,
     Transition,
     TrustRegion,
     Weights,
-    batch_semi_gradient,
+    batched,
     expected_sarsa,
     lstd_q,
     policy_gradient,
     random_direction,
     step_matched,
 )
+from nmpcrl.learning.batches import td_statistics
 
 THETA = np.array([1.0, 0.5, -1.0])
 
@@ -44,7 +44,7 @@ def after(learner, transitions, theta=THETA):
 
 @pytest.mark.parametrize(("every", "count"), [(1, 1), (4, 4), (None, 4)])
 def test_theta_waits_for_a_full_batch_and_moves_by_its_mean(controller, every, count):
-    steps, rule = drawn(controller, count), batch_semi_gradient(Descent(0.1), every)
+    steps, rule = drawn(controller, count), batched(td_statistics, Descent(0.1), every)
     learner = Learner("batch", SecondSolve(controller), rule, 0.9)
     np.testing.assert_array_equal(after(learner, steps[:-1]), THETA)
     alone = [after(expected_sarsa(controller, 0.1), [step]) - THETA for step in steps]
@@ -53,11 +53,11 @@ def test_theta_waits_for_a_full_batch_and_moves_by_its_mean(controller, every, c
 
 def test_a_batch_of_no_step_is_refused():
     with pytest.raises(ValueError, match="every = 0 must be at least 1, or None for an episode"):
-        batch_semi_gradient(Descent(0.1), every=0)
+        lstd_q(None, every=0)
 
 
 def test_nothing_is_remembered_but_in_the_weights(controller):
-    rule, steps = batch_semi_gradient(Adam(0.1), 2), drawn(controller, 6)
+    rule, steps = batched(td_statistics, Descent(0.1), 2), drawn(controller, 6)
     shared = Learner("batch", SecondSolve(controller), rule, 0.9)
     first = second = Weights(THETA)
     for step in steps:  # two runs that take turns
@@ -89,22 +89,6 @@ def test_lstd_q_is_lstd_where_it_is_repeated(controller):
     for _ in range(300):
         theta = after(learner, drawn(controller, 50, theta), theta)
     np.testing.assert_allclose(theta, fixed, rtol=1e-4)
-
-
-def test_the_curvature_of_lstd_q_is_that_of_the_squared_error(quadratic):
-    """Against finite differences of the gradient of mean((target - Q)^2) / 2, target held."""
-    steps = drawn(quadratic, 4)
-    targets = [s.cost + 0.9 * quadratic.value(s.next_state, THETA) for s in steps]
-
-    def gradient(theta):
-        errors = [quadratic.value(s.state, theta) - t for s, t in zip(steps, targets, strict=True)]
-        features = [quadratic.features(s.state, theta) for s in steps]
-        return np.transpose(features) @ errors / len(steps)
-
-    hessian = differences(gradient, THETA, 1e-6)
-    shift = 1e-3 + max(0, -np.linalg.eigvalsh(hessian)[0])
-    expected = THETA - np.linalg.solve(hessian + shift * np.eye(3), gradient(THETA))
-    np.testing.assert_allclose(after(lstd_q(quadratic, curvature=True), steps), expected, rtol=1e-3)
 
 
 def filling(state, action, rng):

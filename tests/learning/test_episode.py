@@ -27,9 +27,8 @@ from nmpcrl.learning import (
 )
 from nmpcrl.learning.episode import NUMBERS, Loop, _row, episodes
 from nmpcrl.learning.loop import FIND, SLOPES
-from nmpcrl.learning.loop import NUMBERS as OF_LOOP
 from nmpcrl.learning.remedies import guarded
-from nmpcrl.learning.training import trainer_of
+from nmpcrl.learning.training import Trainer
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.learners import LEARNERS, NETWORKS, Generators
 
@@ -87,7 +86,7 @@ def rows_and_ends(made, rows_of):
 def assert_same(make, nmpc, explore=None, looped=True, **options):
     """The columns, once they are known to be those of the generator."""
     given = nmpc, weights(), explore or noise()
-    assert (Loop.of(trainer_of(make(nmpc), *given, **options)) is not None) == looped
+    assert (Loop.of(Trainer(make(nmpc), *given, **options)) is not None) == looped
     expected, failures, stopped = rows_and_ends(train(make(nmpc), *given, **options), _row)
     made, columns = [], {}
 
@@ -98,7 +97,7 @@ def assert_same(make, nmpc, explore=None, looped=True, **options):
     found, ends, why = rows_and_ends(episodes(make(nmpc), *given, **options), rows_of)
     np.testing.assert_array_equal(found, expected)
     assert (ends[: len(failures)], why) == (failures, stopped)
-    assert list(made[0].columns) == [*OF_LOOP, "state", "action", "features", "theta", "w"]
+    assert list(made[0].columns) == [*NUMBERS, "state", "action", "features", "theta", "w"]
     for name in made[0].columns:
         columns[name] = np.concatenate([episode.columns[name] for episode in made])
     return columns

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.learning import QNetwork
-from nmpcrl.learning.minimiser import minimiser
+from nmpcrl.learning.bootstrap import minimiser
 
 LOWER, UPPER = np.array([0.0, -1.0]), np.array([0.6, 1.0])  # of the robot's inputs
 FINE = np.stack(np.meshgrid(*np.linspace(LOWER, UPPER, 201).T), -1).reshape(-1, 2)

@@ -8,18 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from nmpcrl.learning import Adam, Descent, GaussNewton, TrustRegion
+from nmpcrl.learning import Descent, GaussNewton, TrustRegion
 
 THETA, GRADIENT = np.array([1.0, -2.0]), np.array([0.5, 3.0])
 CURVATURE = np.array([[2.0, 0.5], [0.5, 1.0]])
 EDGE = np.array([1.0, -10.0]), np.array([1.0, 10.0])  # holds the first component in place
 
 
-def moved(optimiser, theta=THETA, gradients=(GRADIENT,), curvature=None):
-    memory = optimiser.init(theta)
-    for gradient in gradients:
-        theta, memory = optimiser.step(theta, memory, gradient, curvature)
-    return theta
+def moved(optimiser, theta=THETA, gradient=GRADIENT, curvature=CURVATURE):
+    return optimiser(theta, gradient, curvature)
 
 
 def drawn(seed, *, convex=True):
@@ -30,48 +27,32 @@ def drawn(seed, *, convex=True):
 
 
 @pytest.mark.parametrize(
-    ("optimiser", "steps", "by_hand"),
+    ("optimiser", "by_hand"),
     [
-        (Descent(0.1), 1, -0.1 * GRADIENT),
-        (Descent(0.1, momentum=0.5), 2, -0.25 * GRADIENT),
-        (Adam(0.1), 1, -0.1 * np.sign(GRADIENT)),
-        (GaussNewton(0.7, 0.1), 1, -0.7 * np.linalg.solve(CURVATURE + 0.1 * np.eye(2), GRADIENT)),
-        (GaussNewton(1.0, 0.0, EDGE), 1, [0.0, -3.0]),
-        (TrustRegion(1e6, np.array([2.0, 0.1])), 1, -np.linalg.solve(CURVATURE, GRADIENT)),
+        (Descent(0.1), -0.1 * GRADIENT),
+        (GaussNewton(0.7, 0.1), -0.7 * np.linalg.solve(CURVATURE + 0.1 * np.eye(2), GRADIENT)),
+        (GaussNewton(1.0, 0.0, EDGE), [0.0, -3.0]),
+        (TrustRegion(1e6, np.array([2.0, 0.1])), -np.linalg.solve(CURVATURE, GRADIENT)),
     ],
 )
-def test_steps_by_hand(optimiser, steps, by_hand):
-    found = moved(optimiser, gradients=[GRADIENT] * steps, curvature=CURVATURE)
-    np.testing.assert_allclose(found, THETA + by_hand, atol=1e-8)
-
-
-def test_adam_is_that_of_torch():
-    torch = pytest.importorskip("torch")
-    gradients = np.random.default_rng(0).normal(size=(20, 2))
-    theta = torch.tensor(THETA, requires_grad=True)
-    other = torch.optim.Adam([theta], lr=0.05)
-    for gradient in gradients:
-        theta.grad = torch.tensor(gradient)
-        other.step()
-    np.testing.assert_allclose(moved(Adam(0.05), gradients=gradients), theta.detach(), rtol=1e-10)
+def test_steps_by_hand(optimiser, by_hand):
+    np.testing.assert_allclose(moved(optimiser), THETA + by_hand, atol=1e-8)
 
 
 @pytest.mark.parametrize("optimiser", [GaussNewton(), TrustRegion(1.0, np.ones(2))])
 def test_the_second_order_needs_a_curvature_that_is_finite_and_may_be_indefinite(optimiser):
-    with pytest.raises(ValueError, match="needs a curvature, and this rule estimates none"):
-        moved(optimiser)
     assert (moved(optimiser, curvature=np.diag([1.0, -4.0])) - THETA) @ GRADIENT < 0
     assert not np.isfinite(moved(optimiser, curvature=np.full((2, 2), np.nan))).any()
     rank_one = 1e20 * np.outer(GRADIENT, GRADIENT)
-    assert np.isfinite(moved(optimiser, gradients=[1e20 * GRADIENT], curvature=rank_one)).all()
+    assert np.isfinite(moved(optimiser, gradient=1e20 * GRADIENT, curvature=rank_one)).all()
 
 
 @given(st.integers(0, 10_000))
 def test_a_bounded_step_is_the_least_of_the_quadratic_within_the_bounds(seed):
     gradient, H, rng = drawn(seed)
     theta = rng.normal(size=3)
-    lower, upper = theta - rng.uniform(0, 1, 3), theta + rng.uniform(0, 1, 3)
-    found = moved(GaussNewton(1.0, 0.0, (lower, upper)), theta, (gradient,), H)
+    lower, upper = theta - rng.uniform(0, 3), theta + rng.uniform(0, 3)
+    found = moved(GaussNewton(1.0, 0.0, (lower, upper)), theta, gradient, H)
     least = np.inf
     for sides in product((lower, theta, upper), repeat=3):  # each held at a bound, or free
         p = np.array([side[k] for k, side in enumerate(sides)]) - theta
@@ -88,7 +69,7 @@ def test_a_bounded_step_is_the_least_of_the_quadratic_within_the_bounds(seed):
 def test_a_step_in_a_trust_region_is_the_least_of_its_model(seed, convex, radius):
     gradient, H, rng = drawn(seed, convex=convex)
     scale, theta = rng.uniform(0.2, 3, 3), np.ones(3)
-    p = moved(TrustRegion(radius, scale), theta, (gradient,), H) - theta
+    p = moved(TrustRegion(radius, scale), theta, gradient, H) - theta
 
     def model(q):
         return gradient @ (scale * q) + (scale * q) @ H @ (scale * q) / 2
