@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from nmpcrl.study.refusal import ParameterError, Refusal
 
+ATTEMPTS = 3  # how often a job is begun whose process is killed
 AHEAD = 128  # jobs given to an executor of the caller's at a time
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 MEMORY = 0.45e9  # [bytes] of a worker at the end of a full run of RDES
@@ -108,8 +109,11 @@ def _outcomes(
     """Every item with its result or its `Failure`."""
     while lost := (yield from _until_broken(pool(count), ahead, function, items)):
         for item in lost:
-            if (yield from _until_broken(pool(1), 1, function, iter([item]))):
-                yield item, Failure(item, "the loss of its process, twice")
+            for _ in range(ATTEMPTS - 1):
+                if not (yield from _until_broken(pool(1), 1, function, iter([item]))):
+                    break
+            else:
+                yield item, Failure(item, f"the loss of its process, {ATTEMPTS} times")
 
 
 def _until_broken(

@@ -182,7 +182,7 @@ def test_no_process_outlives_the_parent(program, job, sent):
 @pytest.mark.slow
 def test_a_job_whose_process_is_killed_is_begun_again_and_then_fails_alone(program):
     parent = program.start(one="ends", two="sleeps", three="ends")
-    for count in range(2):
+    for count in range(3):
         wait_until(lambda count=count: len(program.began("two")) == count + 1)
         os.kill(program.began("two")[-1], signal.SIGKILL)
     assert parent.wait() == 1
