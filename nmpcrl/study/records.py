@@ -124,6 +124,8 @@ def load_run(
         try:
             with np.load(raw, allow_pickle=False) as file:
                 about = About(**json.loads(str(file["about"])))
+                if about.experiment.get("plant") == "model":  # a field of the first edition
+                    del about.experiment["plant"]
                 if "solver" not in about.facts:
                     raise ValueError("about")
                 if "states" not in about.experiment:  # which a trial has

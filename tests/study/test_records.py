@@ -50,13 +50,18 @@ def test_a_wrong_byte_is_noticed_or_changes_nothing(path):
     assert noticed > 80
 
 
+def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):
+    replace(RUN, experiment={**RUN.experiment, "plant": "model"}).save(path)
+    assert_equal(Records.load(path), RUN)
+
+
 FEWER = {name: one for name, one in RUN.steps.items() if name != "theta"}
 SHORT = RUN.steps | {"cost": RUN.steps["cost"][1:]}
 
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"steps": FEWER}, {"steps": SHORT}, {"experiment": {**RUN.experiment, "plant": "model"}}],
+    [{"steps": FEWER}, {"steps": SHORT}, {"experiment": {**RUN.experiment, "plant": "slips"}}],
     ids=["a column too few", "a short column", "a field of no experiment"],
 )
 def test_a_file_with_other_columns_or_fields_is_damaged(path, wrong):
