@@ -30,7 +30,6 @@ from nmpcrl.study import (
     StoreError,
     fetch,
     fetch_all,
-    records,
     store,
     stored,
 )
@@ -229,20 +228,3 @@ pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork"),
 ]
 TestRuns = Machine.TestCase
-
-
-def test_the_machine_catches_a_file_that_is_not_written_at_once(monkeypatch):
-    def write_file(path: Path, write: Callable) -> None:
-        with path.open("wb") as file:
-            write(file)
-
-    monkeypatch.setattr(records, "write_file", write_file)
-    machine = Machine()
-    machine.read_or_write(EXPERIMENTS[1:])  # imports all that is needed
-    for call in range(400):
-        machine.kill(EXPERIMENTS[0], call)
-        if RUNS.path_of(EXPERIMENTS[0]).exists():
-            break
-    with pytest.raises(AssertionError):
-        machine.every_file_is_the_truth_or_says_that_it_is_damaged()
-    machine.teardown()
