@@ -13,7 +13,6 @@ from nmpcrl.study.limits import afford as afford
 from nmpcrl.study.parameters import ParameterError, one_of, several, shown
 
 INJECTED = "# Parameters\n"  # first line of the cell that papermill adds
-OF_PAPERMILL = "PAPERMILL_"  # prefix of papermill's own names
 ALLOWED = FIELDS | AXES | {"layouts": several(one_of(paper.LAYOUTS), "layout")}
 # Step sizes with which a chapter has something to show: with larger ones a run ends at once.
 MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
@@ -65,4 +64,4 @@ def _injected() -> set[str]:
     *_, latest = ["", *(cell for cell in cells if cell.startswith(INJECTED))]
     assigned = (node for node in ast.walk(ast.parse(latest)) if isinstance(node, ast.Assign))
     names = {one.id for node in assigned for one in node.targets if isinstance(one, ast.Name)}
-    return {name for name in names if not name.startswith(("_", OF_PAPERMILL))}
+    return {name for name in names if not name.startswith(("_", "PAPERMILL_"))}  # its own

@@ -16,8 +16,6 @@ from nmpcrl.study.geometry import FARTHEST, Centres
 from nmpcrl.study.moving import Motion, centres, charge, still
 from nmpcrl.study.parameters import refused, whole
 
-STEPS = whole(1, 10_000)  # of an episode
-
 
 def centres_of(layout: Any) -> Centres:
     """The centres [m] of a layout of the paper, of `TUNE`, or in any other form."""
@@ -40,7 +38,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         A layout is A to F, T01 to T60, or centres; by default each reset draws one of `TUNE`. With
         `motions`, the layout has their first centres.
         """
-        self.plant, self._steps = robot(), STEPS.check("steps", steps)
+        self.plant, self._steps = robot(), whole(1, 10_000).check("steps", steps)
         self._fixed, self._motions = None if layout is None else centres_of(layout), motions
         first = self._fixed or next(iter(TUNE.values()))
         speed, turn = self.plant.upper * self.plant.period * steps
@@ -87,10 +85,12 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
 
 
 class NmpcPolicy:
-    """The NMPC as a policy of `RobotEnv`; the last plan in a layout is the warm start."""
+    """The NMPC with theta, shape (9,), by default theta_init, as a policy of `RobotEnv`.
+
+    The last plan in a layout is the warm start.
+    """
 
     def __init__(self, theta: Vector | None = None) -> None:
-        """Set theta, shape (9,), by default theta_init."""
         self.theta = np.array(paper.THETA_INIT if theta is None else theta, float)
         self._centres: Centres = ()
         self._plan: Solution | None = None

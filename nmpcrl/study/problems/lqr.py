@@ -1,11 +1,9 @@
 """The plant of `gros_zanon` without disturbance, bounds and penalty; A, B, Q and R are learned.
 
-Riccati's equation gives the value and the policy of every theta, and Lyapunov's the cost of a
-policy.
+The value and the policy of a theta solve Riccati's equation, and the cost of a policy Lyapunov's.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
@@ -65,8 +63,7 @@ def optimal(a: Matrix = TRUE_A, b: Matrix = TRUE_B) -> Truth:
 
 def gain(a: Matrix, b: Matrix, r: Matrix, p: Matrix) -> Matrix:
     """K of the input that minimises u'R u + gamma (A x + B u)'P (A x + B u)."""
-    found: Any = np.linalg.solve(r + GAMMA * b.T @ p @ b, GAMMA * b.T @ p @ a)
-    return np.asarray(found)
+    return np.asarray(np.linalg.solve(r + GAMMA * b.T @ p @ b, GAMMA * b.T @ p @ a))
 
 
 def worth(k: Matrix) -> Truth:
@@ -78,13 +75,10 @@ def worth(k: Matrix) -> Truth:
 
 
 def planned(theta: Vector) -> Truth:
-    """The policy and the value, without V0, of a theta's plan, by Riccati's recursion.
-
-    Q and P count as (Q + Q') / 2.
-    """
+    """The policy and the value, without V0, of a theta's plan, by Riccati's recursion."""
     parts = problem().split(theta)
     a, b, q, r, p = (parts[name] for name in "ABQRP")
-    q, p = (q + q.T) / 2, (p + p.T) / 2
+    q, p = (q + q.T) / 2, (p + p.T) / 2  # which have the same costs
     k = np.zeros((b.shape[1], a.shape[0]))
     for _ in range(HORIZON):
         k = gain(a, b, r, p)

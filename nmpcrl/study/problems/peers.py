@@ -42,10 +42,7 @@ class Run(NamedTuple):
 
 
 def run(solver: str, seed: int, steps: int) -> Run:
-    """Train mpcrl's agent for an episode of `gros_zanon`, whose disturbance has a seed.
-
-    `solver` is a name in `SOLVERS`.
-    """
+    """Train mpcrl's agent for an episode of `gros_zanon`, with one of `SOLVERS`."""
     costs, disturbances = [], []
 
     def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Any, ...]:
@@ -69,10 +66,9 @@ def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> A
 def agent(
     controller: Mpc, problem: Problem | None = None, optimiser: Any = None
 ) -> LstdQLearningAgent:
-    """Q-learning after each transition, of a plan in csnlp.
+    """Q-learning after each transition, of a plan in csnlp; `problem` has its theta and gamma.
 
-    `problem` is our form of it, with theta and gamma, and `optimiser` one of mpcrl's; by default
-    `gros_zanon` and a step of Newton.
+    By default they are those of `gros_zanon`, and the optimiser of mpcrl is a step of Newton.
     """
     problem = problem or gz.problem()
     learnable = [LearnableParameter(name, one.shape, one) for name, one in starts(problem).items()]
