@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from differences import agrees
 
-from nmpcrl.control import Nmpc, Obstacle, Plant, SolverError, Task, differential_drive
+from nmpcrl.control import Nmpc, Obstacle, Plant, Riccati, Task, differential_drive
 from nmpcrl.control import nmpc as module
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
@@ -14,38 +13,30 @@ THETA = np.array(paper.THETA_INIT)
 START = np.array(paper.START)
 
 
-def test_the_action_value_of_the_policy_is_the_value(robot, draw):
-    for state, theta in draw(20, seed=30):
+def test_the_action_value_of_the_policy_is_the_value_and_no_action_is_better(robot, draw):
+    """Q >= V, where V is the best plan known: a fixed action may lead to a better local minimum."""
+    rng, led = np.random.default_rng(31), 0
+    lower, upper = robot.plant.lower, robot.plant.upper
+    for state, theta in draw(25, seed=30):
         v = robot.solve(state, theta)
         q = robot.solve(state, theta, v, v.action)
         assert q.value == pytest.approx(v.value, rel=1e-6, abs=1e-6)
         np.testing.assert_allclose(q.features, v.features, atol=1e-5 * np.abs(v.features).max())
         # What pulls at a fixed action is what its bound held back, and nothing where it was free.
         np.testing.assert_allclose(q.multipliers.action, v.multipliers.inputs[0], atol=1e-2)
-
-
-def test_no_action_is_better_than_the_policys(robot, draw):
-    """Q >= V, where V is the best plan known: a fixed action may lead to a better local minimum."""
-    rng, led = np.random.default_rng(31), 0
-    for state, theta in draw(30, seed=31):
-        q = robot.solve(state, theta, action=rng.uniform(robot.plant.lower, robot.plant.upper))
-        v = robot.solve(state, theta)
-        if q.value < v.value:
-            v = robot.solve(state, theta, q)
-            led += 1
-        assert q.value >= v.value - 1e-7 * abs(v.value)
-    assert led <= 3
-
-
-def test_a_fixed_action_is_the_first_input_at_its_bound_too(robot, draw):
-    rng = np.random.default_rng(32)
-    for state, theta in draw(10, seed=32):
-        lower, upper = robot.plant.lower, robot.plant.upper
         corner = np.where(rng.random(2) < 0.5, lower, upper)
         for action in (rng.uniform(lower, upper), corner):
-            solution = robot.solve(state, theta, action=action)
-            np.testing.assert_allclose(solution.action, action, atol=1e-8)
-            assert (np.abs(solution.inputs[1:]) <= upper).all()
+            q = robot.solve(state, theta, action=action)
+            np.testing.assert_allclose(q.action, action, atol=1e-8)
+            assert (np.abs(q.inputs[1:]) <= upper).all()
+            if q.value < v.value:
+                v = robot.solve(state, theta, q)
+                led += 1
+            assert q.value >= v.value - 1e-7 * abs(v.value)
+        for one in (v, q):
+            assert robot.kkt_residual(one) < 1e-4
+            assert robot.kkt_residual(one, relative=True) <= robot.kkt_residual(one)
+    assert led <= 3
 
 
 def test_a_solution_carries_what_learning_reads_and_multipliers_with_their_signs(robot, draw):
@@ -90,32 +81,19 @@ def test_the_sign_of_a_weight_means_nothing(robot):
 @pytest.mark.parametrize("horizon", [1, 2, 25])
 @pytest.mark.parametrize("count", [0, 1, 7])
 def test_horizon_and_number_of_obstacles_are_values(solver, horizon, count):
-    obstacles = tuple(Obstacle(x, -2.0) for x in range(count))
+    obstacles = tuple(Obstacle(x - 1.0, 2.5) for x in range(count))
     box = np.array([9.0, 9.0, np.inf])
     task = Task(START, np.array(paper.TARGET), -box, box, obstacles)
-    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=solver)
+    how = Riccati(1e-11) if solver == "riccati" else solver
+    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=how)
     solution = nmpc.solve(START, THETA)
     assert solution.inputs.shape == (horizon, 2)
     assert solution.slacks.shape == (horizon + 1, count)
     np.testing.assert_array_equal(solution.next_action, solution.inputs[min(1, horizon - 1)])
-    assert nmpc.kkt_residual(solution) < 1e-5
     later = nmpc.solve(nmpc.plant.step(START, solution.action), THETA, solution)
-    assert nmpc.kkt_residual(later) < 1e-5
-
-
-@settings(derandomize=True, deadline=None, max_examples=25)
-@given(
-    state=st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-7, 7)),
-    scale=st.lists(st.floats(0.1, 10), min_size=9, max_size=9),
-)
-def test_wherever_the_robot_is_there_is_a_plan(controllers, state, scale):
-    """Standing still satisfies every hard constraint, so a state in the box is never infeasible."""
-    try:
-        solution = controllers["fatrop"].solve(np.array(state), THETA * scale)
-    except SolverError:  # about one drawn problem in a thousand
-        solution = controllers["ipopt"].solve(np.array(state), THETA * scale)
-    assert solution.value >= 0
-    assert controllers["fatrop"].kkt_residual(solution) < 1e-3
+    for one in (solution, later):
+        assert nmpc.kkt_residual(one) < 1e-5
+    assert solver != "riccati" or agrees(nmpc, solution, 1e-4)
 
 
 @pytest.fixture
@@ -150,12 +128,9 @@ ABSURD = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf, r"(e\+07|10000000)": 1e
           for i, number in ((0, 0.61), (0, -0.61), (1, 1.58), (1, -1.58))),
         ({"state": START[:2]}, r"state has shape \(2,\); it must be \(3,\)"),
         ({"theta": THETA[:8]}, r"theta has shape \(8,\); it must be \(9,\)"),
-        ({"theta": THETA[None]}, r"theta has shape \(1, 9\); it must be \(9,\)"),
         ({"theta": 1.0}, r"theta has shape \(\); it must be \(9,\)"),
         ({"action": np.zeros(3)}, r"action has shape \(3,\); it must be \(2,\)"),
-        ({"theta": "near"}, "theta = 'near' must hold 9 numbers"),
         ({"state": ["x", "y", "z"]}, r"state = \['x', 'y', 'z'\] must hold 3 numbers"),
-        ({"state": None}, "state"),
         ({"theta": [[1.0], [1.0, 2.0]]}, "theta = .* must hold 9 numbers"),
         ({"data": {"wind": 1.0}}, r"data has no 'wind' \(it has target, discs\)"),
     ],
@@ -184,18 +159,13 @@ def test_an_action_may_be_as_large_as_its_bounds():
     ("changed", "message"),
     [
         ({"horizon": 0}, "horizon = 0 must be a whole number, 1 or more"),
-        ({"horizon": 2.5}, "horizon = 2.5 must be a whole number"),
         ({"horizon": True}, "horizon = True must be a whole number"),
-        ({"horizon": "10"}, "horizon = '10' must be a whole number"),
         ({"gamma": 0.0}, r"gamma = 0.0 must lie in \(0, 1\]"),
-        ({"gamma": 1.01}, "gamma = 1.01 must lie in"),
         ({"gamma": np.nan}, "gamma = nan must lie in"),
         ({"slack_weight": 0.0}, "slack_weight = 0.0 must be a positive number"),
         ({"slack_weight": np.inf}, "slack_weight = inf must be a positive number"),
-        *(
-            ({"solver": one}, r"^solver = .* must be one of riccati, fatrop, ipopt$")
-            for one in ("acados", "Riccati", "", None, 3)
-        ),
+        ({"solver": "Riccati"}, r"^solver = 'Riccati' must be one of riccati, fatrop, ipopt$"),
+        ({"solver": 3}, r"^solver = 3 must be one of riccati, fatrop, ipopt$"),
         ({"task": None}, r"a plant needs a task: write Nmpc\(plant, task\)"),
         (
             {"plant": Plant(lambda s, a: s, ("x", "v"), ("u",), [-1], [1])},

@@ -20,7 +20,6 @@ from nmpcrl.control import (
     SolverError,
     rk4,
 )
-from nmpcrl.control.solvers.starts import random_inputs
 
 STRANGER = ca.SX.sym("stranger")
 WITH_DATA = {"model": lambda x, u, th, d: x + u, "stage": lambda x, u, th, d: u**2}
@@ -111,16 +110,11 @@ def test_a_solve_that_is_none():
         nmpc.solve(np.zeros(2), theta[:3])
     with pytest.raises(ValueError, match=r"state .* must hold finite numbers"):
         nmpc.solve(np.array([np.inf, 0]), theta)
+    with pytest.raises(ValueError, match=r"vector has shape \(2,\); it must be \(5,\)"):
+        nmpc.value_hessian_times(nmpc.solve(np.zeros(2), theta), np.zeros(2))
     with pytest.raises(ValueError, match=r"data has no 'wind' .it has none"):
         nmpc.solve(np.zeros(2), theta, data={"wind": 1.0})
     assert nmpc.solve(np.array([3000.0, -2e5]), theta).value > 0  # no unit is forbidden
-
-
-@pytest.mark.parametrize(("lower", "upper"), [(280, 370), (-5, -3), (-1e3, 1e3), (-0.5, 0.2)])
-def test_random_starts_lie_between_the_bounds_wherever_these_are(lower, upper):
-    inputs = random_inputs(problem(lower=lower, upper=upper), 0, 50)
-    assert lower <= inputs.min() < inputs.max() <= upper
-    assert np.ptp(inputs) <= 2
 
 
 @pytest.mark.usefixtures("interpreted")

@@ -10,24 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, Obstacle, Riccati, Task, differential_drive
-from nmpcrl.control.codegen import jit
 from nmpcrl.study import paper
 
 THETA, START = np.array(paper.THETA_INIT), np.array(paper.START)
 BOX = np.array([9.0, 9.0, np.inf])
 
 
-@pytest.mark.parametrize(("horizon", "count"), [(1, 7), (2, 1), (25, 0)])
-def test_horizon_and_number_of_obstacles_do_not_matter_to_them(horizon, count):
-    obstacles = tuple(Obstacle(-1.0 + x, 2.5) for x in range(count))
-    task = Task(START, np.array(paper.TARGET), -BOX, BOX, obstacles)
-    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=Riccati(tolerance=1e-11))
-    assert agrees(nmpc, nmpc.solve(START, THETA), 1e-4)
-
-
 @pytest.mark.parametrize("giver", ["fatrop", "ipopt"])
 def test_the_solution_may_be_another_solvers(controllers, draw, giver):
-    """Those of CasADi multiply by the dense Hessian."""
+    """CasADi's multiply by the dense Hessian."""
     riccati, casadi, rng = controllers["riccati"], controllers[giver], np.random.default_rng(53)
     for state, theta in draw(10, seed=53):
         solution, along = casadi.solve(state, theta), rng.normal(size=9) * theta
@@ -35,15 +26,6 @@ def test_the_solution_may_be_another_solvers(controllers, draw, giver):
         np.testing.assert_array_equal(casadi.value_hessian_times(solution, along), dense)
         product = riccati.value_hessian_times(solution, along)
         np.testing.assert_allclose(product, dense, atol=1e-4 * np.abs(dense).max())
-
-
-def test_without_numba_the_product_is_that_of_the_dense_hessian(monkeypatch):
-    monkeypatch.setattr(jit, "numba_version", lambda: None)
-    nmpc = paper.nmpc()
-    with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
-        solution = nmpc.solve(START, THETA)
-    product = nmpc.value_hessian_times(solution, THETA)
-    np.testing.assert_array_equal(product, nmpc.value_hessian(solution) @ THETA)
 
 
 vectors = st.lists(st.floats(-1, 1), min_size=9, max_size=9).map(lambda v: np.array(v) * THETA)
@@ -101,48 +83,6 @@ def test_at_a_bound_that_is_just_reached_the_curvature_lies_between_its_sides(
     assert free < held - 1e-3 * abs(held)
     margin = 0.01 * (held - free)
     assert free - margin <= curvature(reached) <= held + margin
-
-
-@pytest.mark.parametrize(
-    ("vector", "message"),
-    [
-        (np.zeros(8), r"vector has shape \(8,\); it must be \(9,\)"),
-        (np.zeros((9, 9)), r"vector has shape \(9, 9\); it must be \(9,\)"),
-        (np.full(9, np.nan), "vector .* must hold finite numbers"),
-        ("along", "vector = 'along' must hold 9 numbers"),
-    ],
-)
-def test_a_vector_that_is_none_is_refused(robot, vector, message):
-    solution = robot.solve(START, THETA)
-    with pytest.raises(ValueError, match=message):
-        robot.value_hessian_times(solution, vector)
-
-
-def test_minus_the_multiplier_of_the_action_is_the_slope_of_the_action_value(robot, draw):
-    rng, step, compared = np.random.default_rng(15), 1e-4, 0
-    for state, theta in draw(10, seed=15):
-        action = rng.uniform(robot.plant.lower, robot.plant.upper) / 2
-        solution = robot.solve(state, theta, action=action)
-        near = [
-            [robot.solve(state, theta, solution, action + d) for d in (e, -e)]
-            for e in step * np.eye(2)
-        ]
-        if max(np.abs(s.primal - solution.primal).max() for pair in near for s in pair) > 0.1:
-            continue  # fell into another local minimum
-        slope = [(above.value - below.value) / (2 * step) for above, below in near]
-        np.testing.assert_allclose(-solution.multipliers.action, slope, rtol=1e-3, atol=1e-3)
-        compared += 1
-    assert compared >= 7
-
-
-def test_the_kkt_residual_of_every_solution_is_small(robot, draw):
-    rng = np.random.default_rng(16)
-    for state, theta in draw(50, seed=16):
-        free = robot.solve(state, theta)
-        action = rng.uniform(robot.plant.lower, robot.plant.upper) / 2
-        for one in (free, robot.solve(state, theta, free, action)):
-            assert robot.kkt_residual(one) < 1e-4
-            assert robot.kkt_residual(one, relative=True) <= robot.kkt_residual(one)
 
 
 @pytest.mark.parametrize(

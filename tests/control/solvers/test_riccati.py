@@ -97,70 +97,39 @@ def test_when_it_gives_up_it_says_what_it_tried(monkeypatch):
     assert "\n" not in str(caught.value)
 
 
-def strange() -> Plant:
-    """A plant that cannot be compiled: its dynamics hold an operation that `codegen` lacks."""
-    return Plant(
-        dynamics=lambda state, action: ca.erfinv(action),
-        state_names=("x", "y"),
-        action_names=("u", "v"),
-        lower=[-0.9, -0.9],
-        upper=[0.9, 0.9],
-    )
+def strange(solver: Riccati | Fatrop) -> Nmpc:
+    """A controller that cannot be compiled: its dynamics hold an operation that `codegen` lacks."""
+    plant = Plant(lambda s, a: ca.erfinv(a), ("x", "y"), ("u", "v"), [-0.9] * 2, [0.9] * 2)
+    return Nmpc(plant, Task([0, 0], [1, 1], [-9] * 2, [9] * 2, weights=[1, 1]), solver=solver)
 
 
-def field() -> Task:
-    """Nothing but a target."""
-    two = np.array([1.0, 1.0])
-    return Task(0 * two, two, -9 * two, 9 * two, (), weights=two)
-
-
-def warned(caught) -> list[str]:
-    return [str(one.message) for one in caught if WARNING in str(one.message)]
-
-
-@pytest.mark.parametrize("reason", ["no numba", "the plant"])
+@pytest.mark.parametrize("reason", ["numba is not installed", "OP_ERFINV"])
 def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatch, recwarn, reason):
-    if reason == "no numba":
-        monkeypatch.setattr(jit, "numba_version", lambda: None)
-        nmpc, state, theta, action = paper.nmpc(), START, THETA, np.array([0.3, 0.1])
+    """What was asked for stays; plant and task compute as before."""
+    asked, action = Riccati(tolerance=1e-7), np.array([0.3, 0.1])
+    if reason == "OP_ERFINV":
+        state, theta, make = np.array([1.0, 2.0]), np.array([1, 1, 0.1, 0.1, 1, 1, 0.0]), strange
+        stepped, cost = state + 0.2 * erfinv(action), 1 + np.hypot(*action)  # near the target
     else:
-        nmpc, state, action = Nmpc(strange(), field()), np.zeros(2), np.array([0.3, 0.1])
-        theta = np.array([1, 1, 0.1, 0.1, 1, 1, 0.0])
-    assert nmpc.kkt_residual(nmpc.solve(state, theta)) < 1e-4
-    assert nmpc.solve(state, theta, action=action).value > 0
-    nmpc.solve(state, theta)
-    said = warned(recwarn)
-    assert len(said) == 1
-    assert ("numba is not installed" if reason == "no numba" else "OP_ERFINV") in said[0]
-
-
-def test_what_was_asked_for_stays_and_a_solution_says_what_solved(monkeypatch):
-    asked = Riccati(tolerance=1e-7)
-    assert paper.nmpc(solver=asked).solve(START, THETA).solver == "riccati"
-    monkeypatch.setattr(jit, "numba_version", lambda: None)
-    nmpc = paper.nmpc(solver=asked)
-    with pytest.warns(UserWarning, match=WARNING):
-        solution = nmpc.solve(START, THETA)
-    assert solution.solver == "fatrop"
+        state, theta, make = START, THETA, lambda solver: paper.nmpc(solver=solver)
+        compiled = make(asked)
+        assert compiled.solve(state, theta).solver == "riccati"
+        stepped = compiled.plant.step(state, action)
+        cost = compiled.task.stage_cost(state, action)
+        monkeypatch.setattr(jit, "numba_version", lambda: None)
+    nmpc, exact = make(asked), make(Fatrop(tolerance=1e-7))
+    for given in (None, action):
+        solution = nmpc.solve(state, theta, action=given)
+        np.testing.assert_array_equal(solution.point, exact.solve(state, theta, action=given).point)
+        assert solution.solver == "fatrop"
+        assert nmpc.kkt_residual(solution) < 1e-4
+    product = nmpc.value_hessian(solution) @ theta
+    np.testing.assert_array_equal(nmpc.value_hessian_times(solution, theta), product)
     assert nmpc.solver is asked
-    exact = paper.nmpc(solver=Fatrop(tolerance=1e-7)).solve(START, THETA)
-    np.testing.assert_array_equal(solution.point, exact.point)
-
-
-@pytest.mark.parametrize("reason", ["no numba", "the plant"])
-def test_where_nothing_can_be_compiled_plant_and_task_compute_as_before(monkeypatch, reason):
-    if reason == "no numba":
-        compiled, task = paper.nmpc().plant.step(START, np.array([0.5, 0.3])), paper.task()
-        cost = task.stage_cost(START, np.array([0.5, 0.3]))
-        monkeypatch.setattr(jit, "numba_version", lambda: None)
-        again = paper.nmpc()
-        np.testing.assert_allclose(again.plant.step(START, np.array([0.5, 0.3])), compiled)
-        assert paper.task().stage_cost(START, np.array([0.5, 0.3])) == pytest.approx(cost)
-    else:
-        stepped = strange().step(np.array([1.0, 2.0]), np.array([0.5, -0.5]))
-        np.testing.assert_allclose(stepped, [1, 2] + 0.2 * erfinv([0.5, -0.5]))
-        assert isinstance(stepped, np.ndarray)
-        assert isinstance(field().stage_cost(np.zeros(2), np.zeros(2)), float)
+    np.testing.assert_allclose(nmpc.plant.step(state, action), stepped)
+    assert nmpc.task.stage_cost(state, action) == pytest.approx(cost)
+    (said,) = (str(one.message) for one in recwarn if WARNING in str(one.message))
+    assert reason in said
 
 
 def test_only_what_is_called_from_python_is_compiled_for_it(riccati):
