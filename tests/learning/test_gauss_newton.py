@@ -134,25 +134,10 @@ def test_an_episode_after_one_that_failed_or_was_left_is_as_it_is_alone(free, mo
     np.testing.assert_array_equal(optimiser.gradient, wanted[0])
 
 
-@pytest.mark.parametrize(
-    ("name", "radius", "given", "world"),
-    [
-        ("free", 0.3, {"bounds": (np.zeros(9), np.full(9, 10.0))}, {}),
-        ("tank", 0.1, {"cost": charged}, TANK),
-    ],
-)
-def test_gauss_newton_on_j_lowers_the_cost_within_the_bounds(request, name, radius, given, world):
-    nmpc = request.getfixturevalue(name)
-    theta = THETA if nmpc.task else nmpc.problem.theta
-    learner = closed_loop(nmpc, TrustRegion(radius, np.ones(theta.size)), **given)
-    silent = noise(8, STEPS, nmpc.m, deviation=0.0)
-    *_, last = train(learner, nmpc, Weights(theta), silent, **world)
-    before, after = (
-        evaluate(nmpc, one, STEPS, **world).cost for one in (theta, last.weights.theta)
-    )
-    assert after < before
-    least, most = given.get("bounds", (nmpc.problem.theta_lower, nmpc.problem.theta_upper))
-    assert ((least <= last.weights.theta) & (last.weights.theta <= most)).all()
+def test_gauss_newton_on_j_lowers_the_cost(free):
+    learner = closed_loop(free, TrustRegion(0.3, np.ones(9)), (np.zeros(9), np.full(9, 10.0)))
+    *_, last = train(learner, free, Weights(THETA), noise(6, STEPS, deviation=0.0))
+    assert evaluate(free, last.weights.theta, STEPS).cost < evaluate(free, THETA, STEPS).cost
 
 
 def test_gauss_newton_on_j_asks_for_the_cost_of_a_problems_environment(tank):

@@ -3,7 +3,6 @@
 import copy
 import pickle
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -202,29 +201,6 @@ def test_random_directions_come_from_the_given_generator_alone(controller, trans
     )
     assert one == same == copied != other
     assert one[0] != one[1]
-
-
-class Bandit:
-    """One state, Q_theta(a) = theta_0 + theta_1 a + theta_2 a^2, and the best action is taken."""
-
-    gamma = 0.9
-
-    def solve(self, state, theta, warm_start=None, action=None):
-        a = -theta[1] / (2 * theta[2]) if action is None else action
-        features = np.array([1.0, a, a**2])
-        return SimpleNamespace(value=features @ theta, features=features)
-
-
-def test_q_learning_finds_the_value_of_every_action_from_random_ones():
-    """Whatever is done, the best is done next: Q(a) = c(a) + gamma min c / (1 - gamma)."""
-    bandit, rng = Bandit(), np.random.default_rng(0)
-    learner, weights = q_learning(bandit, 0.1), Weights(np.array([0.0, 0.0, 1.0]))
-    assert learner.values_actions
-    for a in rng.uniform(-1, 1, 5000):
-        solution = bandit.solve(None, weights.theta, action=a)
-        cost = 3 + 2 * (a - 0.5) ** 2
-        weights = learner.step(weights, Transition(None, a, cost, None, solution)).weights
-    np.testing.assert_allclose(weights.theta, [3.5 + 27, -2, 2], rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from learning.small_runs import differences
 from nmpcrl.learning import (
     Transition,
     Weights,
-    expected_sarsa,
     gradient_expected_sarsa,
     gradient_tdc,
 )
@@ -115,56 +113,3 @@ def test_with_w_at_its_best_theta_descends_the_projected_bellman_error(quadratic
     np.testing.assert_allclose(tdc.w, w, atol=1e-12)  # w has nothing left to learn
     missed = np.linalg.norm(printed.theta - theta - descent)
     assert missed > 0.02 * np.linalg.norm(descent)
-
-
-class Spiral:
-    """Three values that wind outwards as theta grows: exp(theta A) v.
-
-    Nothing costs anything, so the right values are 0 and theta should fall for ever; TD lets it
-    grow. Tsitsiklis and Van Roy (1997); a test problem of Maei et al. (2009) as well.
-    """
-
-    gamma = 0.9
-    process = Process(
-        states=np.arange(3)[:, None],
-        P=np.array([[0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]),
-        costs=np.zeros(3),
-        visits=np.full(3, 1 / 3),
-    )
-    growth, turn = 0.05, np.sqrt(3) / 2  # the eigenvalues of A where the values live
-    Q = np.array([[1.0, 0.5, 1.5], [1.5, 1.0, 0.5], [0.5, 1.5, 1.0]])
-    A = Q + growth * np.eye(3)
-
-    def values(self, theta):
-        v, (t,) = np.array([1.0, -0.7, -0.3]), theta
-        turned = np.cos(self.turn * t) * v + np.sin(self.turn * t) / self.turn * self.Q @ v
-        return np.exp(self.growth * t) * turned
-
-    def solve(self, state, theta, *_):
-        values, (i,) = self.values(theta), state
-        return SimpleNamespace(
-            value=values[i],
-            features=(self.A @ values)[[i]],
-            hessian=(self.A @ self.A @ values)[i],
-        )
-
-    def value_hessian_times(self, solution, vector):
-        return solution.hessian * vector
-
-    def follow(self, learner, updates):
-        """The size of the values, which should be 0, after each of the expected updates."""
-        weights, sizes = Weights(np.zeros(1), np.zeros(1)), []
-        for _ in range(updates):
-            weights = self.process.expected_step(learner, self, weights)
-            sizes.append(np.linalg.norm(self.values(weights.theta)))
-        return np.array(sizes)
-
-
-def test_on_the_spiral_of_tsitsiklis_and_van_roy_es_diverges_and_tdc_converges():
-    spiral = Spiral()
-    sizes = spiral.follow(expected_sarsa(spiral, 0.1), 500)
-    assert (np.diff(sizes) > 0).all()
-    assert sizes[-1] > 2 * sizes[0]
-    sizes = spiral.follow(gradient_tdc(spiral, 30.0, 1.0), 1000)
-    assert (np.diff(sizes[20:]) < 0).all()  # once w has learned enough
-    assert sizes[-1] < 0.4 * sizes[0]
