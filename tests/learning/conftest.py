@@ -122,12 +122,12 @@ def robot() -> Nmpc:
 
 @pytest.fixture(scope="session")
 def tank() -> Nmpc:
-    """One state that is no position; the gain of the model is learned, within bounds, and wrong."""
+    """A level that is raised at the price of its stage; its gain is learned, within bounds."""
     problem = Problem(
-        states=1, inputs=1, horizon=5, gamma=0.9, lower=-1, upper=1,
+        states=1, inputs=1, horizon=3, gamma=0.9, lower=-1, upper=1, data={"price": 0.1},
         theta={"gain": Parameter(0.5, 0.2, 0.6), "V0": Parameter(0.0, -10, 10)},
-        model=lambda x, u, th: 0.9 * x + th["gain"] * u,
-        stage=lambda x, u, th: ca.sumsqr(x - 1) + 0.1 * ca.sumsqr(u),
-        initial=lambda x, th: th["V0"],
+        model=lambda x, u, th, d: 0.9 * x + th["gain"] * u - 0.1 * x**2,
+        stage=lambda x, u, th, d: ca.sumsqr(x - 1) + 0.1 * ca.sumsqr(u) + d["price"] * u,
+        initial=lambda x, th, d: th["V0"],
     )  # fmt: skip
     return Nmpc(problem, solver=Ipopt())

@@ -104,7 +104,7 @@ def test_a_run_goes_on_from_the_weights_of_any_of_its_steps(tank, make):
         lambda tank: expected_sarsa(tank, 1e3),
         lambda tank: lstd_q(tank, regularisation=1e-6, every=1),
         lambda tank: policy_gradient(tank, 1e3, every=3),
-        lambda tank: closed_loop(tank, TrustRegion(9.0, np.ones(2)), cost=lambda x, u: -x),
+        lambda tank: closed_loop(tank, TrustRegion(9.0, np.ones(2)), cost=lambda x, u, d: -x),
         lambda tank: step_matched(tank, 1e3, 1e-3),
         lambda tank: random_direction(tank, 1e3, np.random.default_rng(0)),
     ],

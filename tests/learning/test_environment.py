@@ -22,18 +22,6 @@ from nmpcrl.learning import (
 )
 from nmpcrl.learning.training import absurd
 
-
-@pytest.fixture(scope="module")
-def shop() -> Nmpc:
-    """Storage of which each unit that is bought costs the price of its time."""
-    problem = Problem(
-        states=1, inputs=1, horizon=3, gamma=0.9, lower=0, upper=1, data={"price": 0.0},
-        theta={"wear": 0.1}, model=lambda x, u, th, d: 0.8 * x + u,
-        stage=lambda x, u, th, d: ca.sumsqr(x - 1) + d["price"] * u + th["wear"] * ca.sumsqr(u),
-    )  # fmt: skip
-    return Nmpc(problem, solver=Ipopt())
-
-
 PRICES = np.array([0.1, 2.0, 0.5, 0.1, 3.0])
 
 
@@ -113,7 +101,7 @@ TWO_STATES = FILLING | {"plant": lambda s, a, rng: ([1, 2], 0, False)}
         ("tank", FILLING | {"start": "here"}, NO_STATE),
         ("tank", FILLING | {"start": lambda rng: [[0.1], [0.2]]}, NO_STATE),
         (
-            "shop",
+            "tank",
             SELLING | {"data": {"price": 1.0}},
             "data 'price' must be an array with an axis of",
         ),
@@ -157,14 +145,14 @@ def test_a_plant_of_a_task_may_run_away_as_well(robot):
 
 
 @pytest.mark.parametrize("broken", ["plant", "start", "data"])
-def test_an_error_inside_a_function_of_the_user_is_that_error(shop, broken):
+def test_an_error_inside_a_function_of_the_user_is_that_error(tank, broken):
     def fails(*given):
         raise TypeError("mine")
 
     with pytest.raises(ValueError, match=f"^{broken} is called as {broken}"):
-        evaluate(shop, shop.problem.theta, 2, **SELLING | {broken: lambda: None})
+        evaluate(tank, tank.problem.theta, 2, **SELLING | {broken: lambda: None})
     with pytest.raises(TypeError, match=r"^mine$"):
-        evaluate(shop, shop.problem.theta, 2, **SELLING | {broken: fails})
+        evaluate(tank, tank.problem.theta, 2, **SELLING | {broken: fails})
 
 
 class Overwriting:
@@ -195,23 +183,23 @@ class Overwriting:
         return {"price": self.own(self.price)}
 
 
-def test_functions_of_the_user_may_work_in_place(shop):
-    theta, found = shop.problem.theta.copy(), []
+def test_functions_of_the_user_may_work_in_place(tank):
+    theta, found = tank.problem.theta.copy(), []
     for careful in (True, False):
         for start in ({}, {"start": np.array([0.2])}):
             how = Overwriting(careful=careful).world | start
-            ran = evaluate(shop, theta, 4, **how)
-            steps = run(q_learning(shop, 1e-2), shop, noise(2, 3, 1, deviation=0.1), **how)
+            ran = evaluate(tank, theta, 4, **how)
+            steps = run(q_learning(tank, 1e-2), tank, noise(2, 3, 1, deviation=0.1), **how)
             rows = [(s.state, s.action, s.weights.theta, s.plan.data.ravel()) for s in steps]
             found.append([*ran.states, *ran.actions, *map(np.concatenate, rows)])
     for other in found[1:]:
         np.testing.assert_array_equal(np.concatenate(found[0]), np.concatenate(other))
-    np.testing.assert_array_equal(theta, shop.problem.theta)
+    np.testing.assert_array_equal(theta, tank.problem.theta)
 
 
-def test_nothing_is_asked_of_a_time_before_its_turn(shop):
+def test_nothing_is_asked_of_a_time_before_its_turn(tank):
     store = Overwriting(careful=True)
-    run(expected_sarsa(shop, 1e-3), shop, noise(1, 3, 1), **store.world)
+    run(expected_sarsa(tank, 1e-3), tank, noise(1, 3, 1), **store.world)
     assert store.asked == [0, "plant", 1, "plant", 2, "plant", 3]
 
 
@@ -247,22 +235,22 @@ def test_theta_may_be_learned_as_large_as_it_is_solved_with():
     assert [bool(absurd(one, nmpc.largest)) for one in far] == [False, True, True]
 
 
-def test_a_plan_sees_the_data_of_its_stages(shop):
-    theta = shop.problem.theta
-    rollout = evaluate(shop, theta, 4, **SELLING)
+def test_a_plan_sees_the_data_of_its_stages(tank):
+    theta = tank.problem.theta
+    rollout = evaluate(tank, theta, 4, **SELLING)
     windows = [PRICES[[0, 1, 2, 3]], PRICES[1:], PRICES[[2, 3, 4, 4]], PRICES[[3, 4, 4, 4]]]
     for state, action, prices in zip(rollout.states, rollout.actions, windows, strict=True):
-        plan = shop.solve(state, theta, data={"price": prices})
+        plan = tank.solve(state, theta, data={"price": prices})
         np.testing.assert_allclose(action, plan.action, atol=1e-6)
     told = {"data": lambda t: {"price": windows[t] if t < 4 else 0.0}}
-    same = evaluate(shop, theta, 4, **SELLING | told)
+    same = evaluate(tank, theta, 4, **SELLING | told)
     np.testing.assert_array_equal(rollout.actions, same.actions)
 
 
 @pytest.mark.parametrize("constrained", [False, True])
-def test_the_next_state_is_valued_with_the_data_of_the_next_time(shop, constrained):
-    es, how = expected_sarsa(shop, 1e-3), SELLING | {"constrained": constrained}
-    for step, later in pairwise(run(es, shop, noise(2, 3, 1, deviation=0.1), **how)):
+def test_the_next_state_is_valued_with_the_data_of_the_next_time(tank, constrained):
+    es, how = expected_sarsa(tank, 1e-3), SELLING | {"constrained": constrained}
+    for step, later in pairwise(run(es, tank, noise(2, 3, 1, deviation=0.1), **how)):
         if not step.last:
             seen = step.update.successor.solution.data
             np.testing.assert_array_equal(seen[:, 0], later.plan.data[:, 0])

@@ -1,11 +1,10 @@
 """Gauss-Newton on the cost of the closed loop, held to finite differences of whole episodes."""
 
-import casadi as ca
 import numpy as np
 import pytest
 from learning.small_runs import THETA, differences, noise
 
-from nmpcrl.control import Nmpc, Parameter, Problem, SolverError, Task, differential_drive
+from nmpcrl.control import Nmpc, Problem, SolverError, Task, differential_drive
 from nmpcrl.learning import Exploration, TrustRegion, Weights, evaluate, train
 from nmpcrl.learning.gauss_newton import closed_loop
 
@@ -30,25 +29,13 @@ def free() -> Nmpc:
     return Nmpc(differential_drive(), task)
 
 
-@pytest.fixture(scope="module")
-def tank() -> Nmpc:
-    """A level that is raised at the price of its stage; the gain of the model is learned."""
-    problem = Problem(
-        states=1, inputs=1, horizon=4, gamma=0.9, lower=-1, upper=1, data={"price": 0.1},
-        theta={"gain": Parameter(0.5, 0.2, 0.9), "weight": Parameter(1.0, 0.0, 10.0)},
-        model=lambda x, u, th, d: x + 0.5 * u - 0.1 * x**2,
-        stage=lambda x, u, th, d: th["weight"] * (x - 1) ** 2 + u**2 + d["price"] * th["gain"] * u,
-    )  # fmt: skip
-    return Nmpc(problem)
-
-
 def charged(x, u, d):
     return (x - 1) ** 2 + 0.3 * u**2 + d["price"] * u
 
 
 def filling(state, action, rng):
-    later = state + 0.5 * action - 0.1 * state**2
-    return later, float(ca.DM(charged(state, action, {"price": 0.1}))), False
+    later = 0.9 * state + 0.5 * action - 0.1 * state**2
+    return later, charged(*state, *action, {"price": 0.1}), False
 
 
 TANK = {"plant": filling, "start": [0.2]}

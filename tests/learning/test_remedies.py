@@ -1,6 +1,7 @@
 """Remedies: by hand, on the two-state chain, and equal to what they mend where they do not bind."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -31,6 +32,11 @@ def in_turn(learner, weights, transitions):
         weights = learner.step(weights, transition).weights
         path.append(weights)
     return path
+
+
+def asked(judge):
+    """The thetas that were judged."""
+    return [call.args[0] for call in judge.call_args_list]
 
 
 @pytest.fixture
@@ -109,23 +115,12 @@ def test_an_average_is_the_mean_of_the_thetas_that_are_counted(controller, ends,
     np.testing.assert_array_equal(judged_theta(path[-1]), thetas[-1])
 
 
-class Judge:
-    """Says costs in turn, and notes the thetas."""
-
-    def __init__(self, *costs):
-        self.costs, self.asked = list(costs), []
-
-    def __call__(self, theta):
-        self.asked.append(theta)
-        return self.costs.pop(0)
-
-
 def test_undo_goes_back_to_the_best_theta_and_w(controller, ends, weights):
-    judge = Judge(10.0, 8.0, np.inf, 9.0, 7.0)
+    judge = Mock(side_effect=[10.0, 8.0, np.inf, 9.0, 7.0])
     learner = undo(gradient_expected_sarsa(controller, 0.01, 0.02), judge)
     first, second, third, fourth = in_turn(learner, weights, ends)
-    assert (len(judge.asked), judge.costs) == (5, [])
-    np.testing.assert_array_equal(judge.asked[0], weights.theta)
+    assert judge.call_count == 5
+    np.testing.assert_array_equal(asked(judge)[0], weights.theta)
     for back in (second, third):  # a failed rollout, and one that is worse than the best
         np.testing.assert_array_equal(back.theta, first.theta)
         np.testing.assert_array_equal(back.w, first.w)
@@ -134,17 +129,17 @@ def test_undo_goes_back_to_the_best_theta_and_w(controller, ends, weights):
 
 
 def test_undo_confirms_only_where_its_episodes_are_over(controller, transition, weights):
-    judge = Judge(3.0, 2.0, 1.0)
+    judge = Mock(side_effect=[3.0, 2.0, 1.0])
     learner = undo(expected_sarsa(controller, 0.01), judge, every=2)
     one = transition(weights.theta)
     in_turn(learner, weights, [replace(one, last=last) for last in (0, 1, 0, 1, 1, 0, 1, 1)])
-    assert len(judge.asked) == 3
+    assert judge.call_count == 3
 
 
 @pytest.mark.parametrize("wrap", [lambda one: one, averaged])
 def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition, weights, wrap):
     """Whether it had a step or none, and under an average, too."""
-    judge = Judge(10.0, np.inf, 9.0, 8.0)
+    judge = Mock(side_effect=[10.0, np.inf, 9.0, 8.0])
     learner = wrap(undo(expected_sarsa(controller, 0.01), judge))
     moved = learner.step(weights, transition(weights.theta)).weights
     back = learner.interrupted(moved)
@@ -152,18 +147,20 @@ def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition,
     kept = learner.interrupted(learner.step(back, transition(weights.theta)).weights)
     assert not np.array_equal(kept.theta, weights.theta)
     np.testing.assert_array_equal(learner.interrupted(kept).theta, kept.theta)
-    np.testing.assert_array_equal(judge.asked, [weights.theta, moved.theta, kept.theta, kept.theta])
+    np.testing.assert_array_equal(
+        asked(judge), [weights.theta, moved.theta, kept.theta, kept.theta]
+    )
 
 
 def test_what_is_undone_or_averaged_stays_within_the_bounds(controller, transition, weights):
-    judge, bounds = Judge(2.0, 1.0), (np.full(3, -1.5), np.ones(3))
+    judge, bounds = Mock(side_effect=[2.0, 1.0]), (np.full(3, -1.5), np.ones(3))
     base = replace(expected_sarsa(controller, 1.0), bounds=bounds)
     one = replace(transition(weights.theta, cost=50.0), last=True)
     for learner in (averaged(base), undo(base, judge), averaged(averaged(base))):
         found = learner.step(weights, one).weights
         np.testing.assert_array_equal(judged_theta(found), found.theta)
         np.testing.assert_array_equal(found.theta, np.clip(found.theta, *bounds))
-    np.testing.assert_array_equal(judge.asked[-1], found.theta)
+    np.testing.assert_array_equal(asked(judge)[-1], found.theta)
 
 
 @pytest.mark.parametrize("make", [lambda c: expected_sarsa(c, 0.01), lstd_q])
