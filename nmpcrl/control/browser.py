@@ -1,4 +1,4 @@
-"""A controller as WebAssembly: the solver that trains every run, for any other host."""
+"""What `codegen.browser` compiles of a controller, and the numbers that its host is given."""
 
 from importlib.resources import files
 from typing import Any
@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.codegen import browser
 from nmpcrl.control.codegen.source import INNER, source
 from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
@@ -16,12 +15,15 @@ from nmpcrl.control.solvers import riccati, stages
 from nmpcrl.control.task import Task
 
 ARRAYS = ("data", "lower", "upper", "sides", "kind", "discount", "weights", "others", "drawn")
-CHARGE = '''"""The RL stage cost of a task."""
+TASK = '''"""The RL stage cost of a task; `task_cost` is called as `entries`."""
 
 import math
 
 import numpy as np
-from numba import njit
+from numba import carray, float64, njit
+
+from .entries import address, unpacked
+from .model import NU, NX
 
 
 {entered}
@@ -34,14 +36,6 @@ from numba import njit
     for at in range(len(state), len(data), 3):
         total += entered(state, data[at:])
     return charged(state, action, data, (total,))
-'''
-TASK = '''"""What is called of a task: see `entries`."""
-
-from numba import carray, float64, njit
-
-from .charge import charge
-from .entries import address, unpacked
-from .model import NU, NX
 
 
 @njit(float64(address, address, address), error_model="numpy")
@@ -55,42 +49,30 @@ EXPORTS = (task_cost,)
 '''
 
 
-def module(of: Plant | Problem, task: Task | None = None) -> bytes:
-    """One WebAssembly module that solves, of a plant and a task or of a `Problem`.
-
-    Its functions are those of `solvers.entries`, and of `TASK` where there is a task. All numbers
-    that `problem` returns are arguments of the functions. Made once, in about a minute, and kept
-    with the machine code.
-
-    Raises:
-        CannotCompile: the plant or the task holds an operation that is not known.
-        RuntimeError: numba is missing, or cannot compile this.
-        CannotLink: they call more than the functions that every host has.
-    """
-    return browser.from_texts(texts(of, task))
-
-
 def texts(of: Plant | Problem, task: Task | None = None) -> dict[str, str]:
     """What is compiled: the text of each module by its name; a `Problem` has no task.
 
-    Each function in the `EXPORTS` of a module is exported.
+    Its functions are those of `solvers.entries`, and of `TASK` where there is a task. All numbers
+    that `problem` returns are arguments of the functions.
+
+    Raises:
+        CannotCompile: the plant or the task holds an operation that is not known.
     """
-    beside = {}
+    beside = {"entries": files(riccati.__package__).joinpath("entries.py").read_text("utf-8")}
     if not isinstance(of, Problem):
         assert task is not None
-        beside = {"charge": charge(task, of.m), "task": TASK}
+        beside["task"] = _task(task, of.m)
         of = task.problem(of, horizon=1, gamma=1.0, slack_weight=1.0)
-    entries = files(riccati.__package__).joinpath("entries.py").read_text("utf-8")
-    return riccati.TEXTS | {"model": stages.write(of.solved), "entries": entries} | beside
+    return riccati.TEXTS | {"model": stages.write(of.solved)} | beside
 
 
-def charge(task: Task, inputs: int) -> str:
-    """The text of the module `charge`, whose function is Eq. (20) for any target and obstacles."""
+def _task(task: Task, inputs: int) -> str:
+    """The text of the module `task`, for any target and obstacles."""
     state, action = ca.SX.sym("state", task.start.size), ca.SX.sym("action", inputs)
     target, disc = ca.SX.sym("target", task.start.size), ca.SX.sym("disc", 3)
     total, entered = ca.SX.sym("total"), task.entered(state, *ca.vertsplit(disc))
     given = {"state": state, "action": action, "target": target, "total": total}
-    return CHARGE.format(
+    return TASK.format(
         inner=INNER,
         entered=_inner("entered", {"state": state, "disc": disc}, entered),
         charged=_inner("charged", given, task.cost_of(*given.values())),

@@ -11,7 +11,6 @@ LEARN = '''"""What is called to learn: `loop` on pointers, as in `entries`."""
 import numpy as np
 from numba import carray, float32, float64, int32, int64, njit, types, uint64
 
-from .charge import charge
 from .dense import at_addresses, fit, follow, predict, remember
 from .entries import COLD, address, lengths, unpacked
 from .find import find
@@ -19,6 +18,7 @@ from .loop import COUNT, copy, episode, move, plain, start_in
 from .loop import td_error as error
 from .model import NTHETA, NU, NX, transition
 from .slopes import slopes
+from .task import charge
 
 HOW = 9  # numbers of a learner besides the bounds of theta
 NONE = np.zeros(1)  # neither theta nor data is read by the model of a plant
@@ -94,13 +94,17 @@ EXPORTS = (learn, td_error, moved)
 
 
 def module(of: Plant | Problem, task: Task | None = None) -> bytes:
-    """`control.browser.module`, and with a task what `LEARN` describes.
+    """One WebAssembly module that solves, and with a task learns: `browser.texts` and `LEARN`.
+
+    Made once, in about a minute, and kept with the machine code.
 
     Raises:
-        CannotCompile, RuntimeError, CannotLink: as there.
+        CannotCompile: numba is missing, or the plant or task holds an operation that is not known.
+        RuntimeError: numba cannot compile this, or it calls more than every host has.
     """
-    if task is None:
-        return browser.module(of)
-    here = files(__package__)
-    own = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in OWN}
-    return from_texts(browser.texts(of, task) | own | {"learn": LEARN})
+    learning = {}
+    if task is not None:
+        here = files(__package__)
+        learning = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in OWN}
+        learning["learn"] = LEARN
+    return from_texts(browser.texts(of, task) | learning)

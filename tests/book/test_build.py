@@ -21,7 +21,6 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from raising import raising
 
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
-from nmpcrl.control import browser as alone
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.study import paper
@@ -334,7 +333,6 @@ def test_what_live_figures_solve_with_is_compiled_ahead_if_it_can_be(known, monk
             raise CannotCompile("tan")
 
     monkeypatch.setattr(browser, "module", module)
-    monkeypatch.setattr(alone, "module", module)
     train.compile_for_pages()
     (plant, task), *problems = asked
     assert (plant.n, tuple(task.start)) == (3, paper.START)

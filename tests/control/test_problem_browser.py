@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from wasm_host import Controller, Module
 
-from nmpcrl.control import Hard, Nmpc, Problem, Series, Soft, browser, rk4
+from nmpcrl.control import Hard, Nmpc, Problem, Series, Soft, rk4
+from nmpcrl.control.browser import texts
+from nmpcrl.control.codegen.browser import from_texts
 
 
 def tank() -> Problem:
@@ -101,7 +103,7 @@ PROBLEMS = {
 def test_values_gradients_and_slopes_are_those_of_the_machine_code(make):
     """Cold, warm and shifted; with u_0 free and given; and the model's step and cost."""
     problem, (most, box, actions) = make(), PROBLEMS[make]
-    data = browser.module(problem)
+    data = from_texts(texts(problem))
     assert len(data) < 1000 * most
     nmpc = Nmpc(problem)
     module = Controller(Module(data), nmpc)

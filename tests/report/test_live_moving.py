@@ -8,7 +8,6 @@ from wasm_host import Controller, Module
 
 from nmpcrl.analysis.encounters import count, judged
 from nmpcrl.control import Nmpc
-from nmpcrl.control import browser as alone
 from nmpcrl.learning import browser
 from nmpcrl.report import live
 from nmpcrl.report.live import frame, moving_obstacles
@@ -23,8 +22,7 @@ ON_THE_START = (Straight((-1.5, 1.4), (0.1, 0.1)), *SCENE[1:])
 @pytest.fixture(scope="module")
 def shown() -> str:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(browser, "module", lambda plant, task: b"abc")
-        patch.setattr(alone, "module", lambda problem: b"def")
+        patch.setattr(browser, "module", lambda *of: b"abc" if len(of) == 2 else b"def")
         return live.moving().data
 
 
@@ -70,7 +68,7 @@ def modules() -> tuple[Controller, Controller]:
     nmpc = paper.controller(paper.task([one.centre for one in SCENE]))
     there = Controller(Module(browser.module(nmpc.plant, nmpc.task)), nmpc)
     planned = moving.problem()
-    return there, Controller(Module(alone.module(planned)), Nmpc(planned))
+    return there, Controller(Module(browser.module(planned)), Nmpc(planned))
 
 
 @pytest.mark.slow

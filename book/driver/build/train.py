@@ -34,7 +34,6 @@ def compiling_for_pages() -> Iterator[None]:
 
 def compile_for_pages() -> None:
     """Compile these modules, unless they are kept; where they cannot be had, the figures say so."""
-    from nmpcrl.control import browser as alone
     from nmpcrl.control.codegen.source import CannotCompile
     from nmpcrl.learning import browser
     from nmpcrl.study import Experiment, moving
@@ -43,7 +42,7 @@ def compile_for_pages() -> None:
     nmpc = controller_of(Experiment())
     with suppress(CannotCompile):
         browser.module(nmpc.plant, nmpc.task)
-        alone.module(moving.problem())
+        browser.module(moving.problem())
 
 
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:

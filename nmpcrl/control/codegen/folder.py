@@ -1,40 +1,60 @@
 """The folder in which machine code is kept, and to which only its user may write.
 
-numba runs what it finds there, so anyone who can write to it can run code as its user.
+numba runs the files in it, so anyone who can write to it can run code as its user.
 """
 
 import atexit
+import importlib
 import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
+
+from filelock import FileLock
 
 CHOSEN = "NMPCRL_CACHE"  # in the environment: another folder than the default
-ROOM = 4_000_000  # bytes: three times the size of the compiled solver
 OTHERS = 0o022  # may write: the group, and everybody
+Result = TypeVar("Result")
 
 
 def chosen() -> Path:
-    """What NMPCRL_CACHE says, or nmpcrl in the user's cache folder."""
-    said = os.environ.get(CHOSEN)
-    if said:
-        return Path(said)
+    """NMPCRL_CACHE, or nmpcrl in the user's cache folder."""
+    named = os.environ.get(CHOSEN)
+    if named:
+        return Path(named)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "nmpcrl"
 
 
-def temporary() -> Path:
-    """A new folder that takes over, here and in the processes started from here, until the end."""
+def use(name: str, work: Callable[[Path], Result]) -> Result:
+    """The result of `work` on the place of this name, in one process at a time.
+
+    Where it meets an `OSError`, a temporary folder takes the place of the chosen one, here and in
+    processes started from here; a message says why.
+    """
+    try:
+        return _locked(name, work)
+    except OSError as error:
+        why = f"{chosen()}: {error.strerror}" if error.strerror else str(error)
     place = tempfile.mkdtemp(prefix="nmpcrl-")
     atexit.register(shutil.rmtree, place, ignore_errors=True)
     os.environ[CHOSEN] = place
-    return Path(place)
+    said = f"{why}; machine code is kept in a temporary folder until this process ends"
+    print(said, file=sys.stderr)
+    return _locked(name, work)
+
+
+def _locked(name: str, work: Callable[[Path], Result]) -> Result:
+    place = private(chosen()) / name
+    with FileLock(f"{place}.lock"):
+        return work(place)
 
 
 def private(place: Path) -> Path:
-    """`place`, made if it is not there, once it is known to be this user's own.
+    """`place`, made if it is missing, once it is known to be this user's own.
 
     Raises:
         OSError: it cannot be made or written, or another user could put code there.
@@ -52,30 +72,20 @@ def private(place: Path) -> Path:
 
 
 def write(place: Path, texts: Mapping[str, str]) -> None:
-    """Put modules there, all at once; another process may have been faster.
+    """Write the modules of a package into its folder, made if it is missing."""
+    for module, text in texts.items():
+        (private(place) / f"{module}.py").write_bytes(text.encode())
 
-    Raises:
-        OSError: they cannot be written, or there is no room for what numba will add.
-    """
-    drafted = Path(tempfile.mkdtemp(dir=place.parent, prefix=".draft"))
+
+def imported(place: Path) -> ModuleType:
+    """The package in a folder; if its import fails, none of its modules stays."""
+    sys.path.insert(0, str(place.parent))
+    importlib.invalidate_caches()
     try:
-        (drafted / "room").write_bytes(bytes(ROOM))
-        (drafted / "room").unlink()
-        for module, text in texts.items():
-            (drafted / f"{module}.py").write_bytes(text.encode())
-        drafted.rename(place)
-    except OSError:
-        shutil.rmtree(drafted, ignore_errors=True)
-        if not place.exists():
-            raise
-
-
-@cache
-def _say(sentence: str) -> None:
-    print(sentence, file=sys.stderr)
-
-
-def say_once(error: OSError, consequence: str) -> None:
-    """Say why a folder is not used and what follows, the same only once in a process."""
-    where = f"{chosen()}: {error.strerror}" if error.strerror else str(error)
-    _say(f"{where}; {consequence}")
+        return importlib.import_module(place.name)
+    except BaseException:
+        for name in [name for name in sys.modules if name.split(".")[0] == place.name]:
+            del sys.modules[name]
+        raise
+    finally:
+        sys.path.remove(str(place.parent))

@@ -1,8 +1,7 @@
 """Python text to machine code by numba, kept on disk: compiled once on a machine, then loaded.
 
 A package of modules lives in a folder named by a hash of its text and of all versions concerned,
-so what is there is right by construction. numba keeps the machine code in the same folder, which
-`folder` finds; where the disk fails, the same text is compiled in memory.
+and numba keeps the machine code in the same folder.
 """
 
 import hashlib
@@ -12,8 +11,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -24,10 +22,10 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.codegen import folder, importing
+from nmpcrl.control.codegen import folder
 from nmpcrl.control.codegen.source import CannotCompile, returns, source
 
-COMPLETE = "complete"  # a file that says that everything in its folder is compiled: a checksum
+COMPLETE = "complete"  # a file in the folder of a package: all of it is compiled
 LOADING = threading.Lock()  # a package that one thread is importing is no package yet
 
 HEADER = """import math
@@ -95,98 +93,76 @@ def numba_version() -> str | None:
         return None
 
 
+def key(name: str, texts: Mapping[str, str], *more: object) -> str:
+    """`name` and a hash of the texts and of all versions on which compiled code depends.
+
+    Raises:
+        CannotCompile: numba is not installed.
+    """
+    if numba_version() is None:
+        raise CannotCompile("numba is not installed")
+    depends = [sorted(texts.items()), sys.version, numba_version(), platform.machine(), *more]
+    return f"{name}_{hashlib.sha256(repr(depends).encode()).hexdigest()[:16]}"
+
+
 def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
-    """Import a package of modules; what numba compiles there is found again the next time.
+    """Import a package of modules; the next process finds what numba compiles in it.
 
     Args:
-        name: what the package is called; a hash is added.
-        texts: the text of each module by its name; that of `__init__` is returned.
+        name: of the package; a hash is added.
+        texts: the text of each module by its name; the module `__init__` is returned.
         notice: said on standard error while something is compiled.
 
     Raises:
         CannotCompile: numba is not installed, or cannot compile this.
-        MemoryError: what is compiled cannot be loaded, though it is as it was written.
-        RuntimeError: the texts do not fit each other.
+        OSError: a temporary folder cannot hold it either.
     """
-    if numba_version() is None:
-        raise CannotCompile("numba is not installed")
-    depends = [sorted(texts.items()), sys.version, numba_version(), platform.machine()]
-    package = f"{name}_{hashlib.sha256(repr(depends).encode()).hexdigest()[:16]}"
+    package = key(name, texts)
     with LOADING:
-        return sys.modules.get(package) or _load(package, texts, notice)
+        if package in sys.modules:
+            return sys.modules[package]
+        return folder.use(package, lambda place: _load(place, texts, notice))
 
 
-def _load(package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
-    """From the cache, from a temporary folder, from memory: no fault of a disk has a say."""
-    for find, instead in (
-        (folder.chosen, "in a temporary folder"),
-        (folder.temporary, "in memory"),
-    ):
+def _load(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
+    """The package from its folder, compiled if it is not complete."""
+    complete = folder.private(place) / COMPLETE
+    if complete.exists():
         try:
-            return _from_disk(folder.private(find()), package, texts, notice)
-        except OSError as error:
-            folder.say_once(error, f"machine code is kept {instead} until this process ends")
-        except MemoryError:
+            if not _holds(place, texts):
+                raise ImportError("its text is another")
+            return folder.imported(place)
+        except (OSError, MemoryError):
             raise
-        except Exception:  # of the text, or of what became of it on the disk: memory will tell
-            break
-    return _from_memory(package, texts, notice)
-
-
-def _from_disk(parent: Path, package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
-    """The package from its folder, where it is written and compiled if it is not there whole.
-
-    Raises:
-        OSError: the disk does not let it.
-    """
-    place = parent / package
-    if not place.exists():
-        folder.write(place, texts)
-    folder.private(place)
+        except Exception as error:  # whatever a damaged file makes numba raise
+            print(f"{place} is damaged ({error}) and is compiled again", file=sys.stderr)
+    shutil.rmtree(place)
     try:
-        if not _holds(place, texts):
-            raise ImportError("its text is another")
-        if (place / COMPLETE).exists():
-            return importing.from_folder(package, place)
-    except (OSError, MemoryError):
-        raise
-    except Exception as error:  # whatever a damaged file makes numba raise
-        if _is_as_compiled(place):
-            raise MemoryError(
-                f"{place} is whole and cannot be loaded ({error}): is there too little memory?"
-            ) from error
-        print(f"{place} is damaged ({error}) and is compiled again", file=sys.stderr)
-        shutil.rmtree(place)
-        folder.write(place, texts)
-    try:
-        with _announced(notice):
-            module = importing.from_folder(package, place)
-    except OSError:
-        raise
+        module = _compiled(place, texts, notice)
     except Exception as error:
-        disturbed = not _holds(place, texts)
         shutil.rmtree(place, ignore_errors=True)
-        if disturbed:
-            raise OSError(f"{place} was changed while it was compiled") from error
-        raise
-    with suppress(OSError):  # it is compiled, and the next process compiles it once more
-        (place / COMPLETE).write_text(_checksum(place))
+        if isinstance(error, OSError | MemoryError) or not _in_numba(error):
+            raise
+        reason = (str(error).strip() or type(error).__name__).splitlines()[-1]
+        raise CannotCompile(f"numba cannot compile {place.name}: {reason}") from error
+    complete.touch()
     return module
 
 
-def _is_as_compiled(place: Path) -> bool:
-    """Whether a folder that is complete holds what was compiled."""
-    complete = place / COMPLETE
-    return complete.is_file() and complete.read_text("utf-8") == _checksum(place)
-
-
-def _checksum(place: Path) -> str:
-    """Of all that is in a folder but `COMPLETE`."""
-    hashed = hashlib.sha256()
-    for path in sorted(place.rglob("*")):
-        if path.is_file() and path.name != COMPLETE:
-            hashed.update(path.relative_to(place).as_posix().encode() + path.read_bytes())
-    return hashed.hexdigest()
+def _compiled(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
+    """The package, written and imported, which compiles it."""
+    folder.write(place, texts)
+    if not notice:
+        return folder.imported(place)
+    began = time.perf_counter()
+    print(notice, end=" ", file=sys.stderr, flush=True)
+    try:
+        module = folder.imported(place)
+    except BaseException:
+        print("stopped.", file=sys.stderr)
+        raise
+    print(f"done in {time.perf_counter() - began:.0f} s.", file=sys.stderr)
+    return module
 
 
 def _holds(place: Path, texts: Mapping[str, str]) -> bool:
@@ -195,40 +171,8 @@ def _holds(place: Path, texts: Mapping[str, str]) -> bool:
     return all(path.is_file() and path.read_bytes() == text for path, text in paths.items())
 
 
-def _from_memory(package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
-    """The package without any file, for this process alone; numba caches in files only."""
-    uncached = {module: text.replace(", cache=True", "") for module, text in texts.items()}
-    try:
-        with _announced(notice):
-            return importing.from_memory(package, uncached)
-    except Exception as error:
-        reason = (str(error).strip() or type(error).__name__).splitlines()[-1]
-        if _passed_through_numba(error):
-            raise CannotCompile(f"numba cannot compile {package}: {reason}") from error
-        raise RuntimeError(
-            f"the modules of {package} do not fit each other ({reason}): if nmpcrl was changed"
-            " while it ran, start it again"
-        ) from error
-
-
-def _passed_through_numba(error: Exception) -> bool:
+def _in_numba(error: Exception) -> bool:
     """Whether it was raised while numba compiled, and not by a module's own lines."""
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
     names = {frame.f_globals.get("__name__", "").partition(".")[0] for frame in frames}
     return bool(names & {"numba", "llvmlite"})
-
-
-@contextmanager
-def _announced(notice: str) -> Iterator[None]:
-    """Say `notice` before something that takes long, and how long it took after it."""
-    if not notice:
-        yield
-        return
-    began = time.perf_counter()
-    print(notice, end=" ", file=sys.stderr, flush=True)
-    try:
-        yield
-    except BaseException:
-        print("stopped.", file=sys.stderr)
-        raise
-    print(f"done in {time.perf_counter() - began:.0f} s.", file=sys.stderr)

@@ -17,30 +17,16 @@ INNER = (
     '@njit(error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True,'
     " _nrt=False)\n"
 )
-UNARY = {
+FUNCTIONS = [
+    *("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh"),
+    *("asinh", "acosh", "atanh", "expm1", "log1p", "erf"),
+]
+UNARY = {getattr(ca, f"OP_{name.upper()}"): f"math.{name}({{}})" for name in FUNCTIONS} | {
     ca.OP_ASSIGN: "{}",
     ca.OP_NEG: "-{}",
-    ca.OP_EXP: "math.exp({})",
-    ca.OP_LOG: "math.log({})",
-    ca.OP_SQRT: "math.sqrt({})",
     ca.OP_SQ: "{0} * {0}",
     ca.OP_TWICE: "2.0 * {}",
     ca.OP_INV: "1.0 / {}",
-    ca.OP_SIN: "math.sin({})",
-    ca.OP_COS: "math.cos({})",
-    ca.OP_TAN: "math.tan({})",
-    ca.OP_ASIN: "math.asin({})",
-    ca.OP_ACOS: "math.acos({})",
-    ca.OP_ATAN: "math.atan({})",
-    ca.OP_SINH: "math.sinh({})",
-    ca.OP_COSH: "math.cosh({})",
-    ca.OP_TANH: "math.tanh({})",
-    ca.OP_ASINH: "math.asinh({})",
-    ca.OP_ACOSH: "math.acosh({})",
-    ca.OP_ATANH: "math.atanh({})",
-    ca.OP_EXPM1: "math.expm1({})",
-    ca.OP_LOG1P: "math.log1p({})",
-    ca.OP_ERF: "math.erf({})",
     ca.OP_FABS: "abs({})",
     ca.OP_FLOOR: "np.floor({})",
     ca.OP_CEIL: "np.ceil({})",
@@ -91,23 +77,26 @@ def source(
     Args:
         function: an SX function.
         returned: whether the result is returned, if not as above.
-        matrices: arguments and results that are matrices even where they have a single column.
-        sparse: results of which the nonzeros are written and nothing else.
-        added: results of which the nonzeros are added to what the array holds.
-        shifted: arguments and results that begin at a row of an array, by the name of a further
-            argument, a number, that says at which.
+        matrices: arguments and results that are matrices even with a single column.
+        sparse: results of which only the nonzeros are written.
+        added: results whose nonzeros are added to the numbers in the array.
+        shifted: arguments and results that begin at a row of an array, with the name of a further
+            argument: the number of this row.
 
     Raises:
         CannotCompile: an operation is not known here, or the function is no expression of scalars.
     """
     if not function.is_a("SXFunction"):
         raise CannotCompile(f"{function.name()} is not an SX function")
-    names = [function.name_in(i) for i in range(function.n_in())]
-    given, results = _expressions(function, {*sparse, *added})
-    out = ca.Function(function.name(), given, results, names, function.name_out())
+    names, given = function.name_in(), function.sx_in()
+    results = [
+        one if name in sparse or name in added else ca.densify(one)
+        for name, one in zip(function.name_out(), function.call(given), strict=True)
+    ]
+    out = ca.Function(function.name(), given, ca.cse(results), names, function.name_out())
     returned = returns(function) if returned is None else returned
-    way = _Way(matrices, added, shifted)
-    lines = [_line(out, k, returned, way) for k in range(out.n_instructions())] or ["pass"]
+    layout = _Layout(matrices, added, shifted)
+    lines = [_line(out, k, returned, layout) for k in range(out.n_instructions())] or ["pass"]
     written = [] if returned else [f"{name}_" for name in out.name_out()]
     arguments = ", ".join([*names, *written, *dict.fromkeys(shifted.values())])
     return "\n    ".join([f"def {out.name()}({arguments}):", *lines]) + "\n"
@@ -118,15 +107,8 @@ def returns(function: ca.Function) -> bool:
     return function.n_out() == 1 and function.size_out(0) == (1, 1)
 
 
-def _expressions(function: ca.Function, sparse: Collection[str]) -> tuple[list[ca.SX], list[ca.SX]]:
-    """Arguments and results, dense unless `sparse`, common subexpressions eliminated."""
-    arguments = function.sx_in()
-    named = zip(function.name_out(), function.call(arguments), strict=True)
-    return arguments, ca.cse([one if name in sparse else ca.densify(one) for name, one in named])
-
-
-class _Way(NamedTuple):
-    """How entries are written."""
+class _Layout(NamedTuple):
+    """Where entries of arguments and results are: see `source`."""
 
     matrices: Collection[str]
     added: Collection[str]
@@ -141,7 +123,7 @@ class _Way(NamedTuple):
         return row if vector else f"{row}, {columns[nonzero]}"
 
 
-def _line(function: ca.Function, k: int, returned: bool, way: _Way) -> str:
+def _line(function: ca.Function, k: int, returned: bool, layout: _Layout) -> str:
     """Instruction k; work variables are called w0, w1, ..."""
     operation, into = function.instruction_id(k), function.instruction_output(k)
     of = function.instruction_input(k)
@@ -149,31 +131,26 @@ def _line(function: ca.Function, k: int, returned: bool, way: _Way) -> str:
         return f"w{into[0]} = {_number(function.instruction_constant(k))}"
     if operation == ca.OP_INPUT:
         name = function.name_in(of[0])
-        entry = way.entry(name, function.sparsity_in(of[0]), of[1])
+        entry = layout.entry(name, function.sparsity_in(of[0]), of[1])
         return f"w{into[0]} = {name}[{entry}]"
     if operation == ca.OP_OUTPUT:
         if returned:
             return f"return w{of[0]}"
         name = function.name_out(into[0])
-        entry = way.entry(name, function.sparsity_out(into[0]), into[1])
-        return f"{name}_[{entry}] {'+=' if name in way.added else '='} w{of[0]}"
-    template = UNARY.get(operation) or BINARY.get(operation)
+        entry = layout.entry(name, function.sparsity_out(into[0]), into[1])
+        return f"{name}_[{entry}] {'+=' if name in layout.added else '='} w{of[0]}"
     if operation == ca.OP_CALL:
         raise CannotCompile(
             f"{function.name()} calls a function that is not written in SX; for a table of"
             " ca.interpolant, write ca.pw_lin(x, points, values)"
         )
+    template = UNARY.get(operation) or BINARY.get(operation)
     if template is None:
-        raise CannotCompile(
-            f"{function.name()} holds CasADi's {_name(operation)}, which is not known here"
-        )
+        codes = (name for name in dir(ca) if name.startswith("OP_"))
+        called = next(name for name in codes if getattr(ca, name) == operation)
+        raise CannotCompile(f"{function.name()} holds CasADi's {called}, which is not known here")
     return f"w{into[0]} = " + template.format(*(f"w{i}" for i in of))
 
 
 def _number(value: float) -> str:
     return repr(value) if math.isfinite(value) else f"math.{value}".replace("math.-", "-math.")
-
-
-def _name(operation: int) -> str:
-    """What CasADi calls an operation."""
-    return next(n for n in dir(ca) if n.startswith("OP_") and getattr(ca, n) == operation)

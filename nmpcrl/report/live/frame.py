@@ -11,7 +11,6 @@ from typing import Any
 from IPython.display import HTML
 
 from nmpcrl.control import Nmpc, Problem
-from nmpcrl.control import browser as alone
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report.prose import ROOT
@@ -68,7 +67,7 @@ def solving(
     try:
         modules = {MODULE: browser.module(nmpc.plant, nmpc.task)}
         if problem is not None:
-            modules[PROBLEM] = alone.module(problem)
+            modules[PROBLEM] = browser.module(problem)
         return figure(name, data(), scripts, modules, styles)
     except CannotCompile as error:
         return absent(error)

@@ -1,15 +1,21 @@
 """The solver as a WebAssembly module gives the numbers of the machine code."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from raising import raising
 from wasm_host import Controller, Module
 
-from nmpcrl.control import Nmpc, Obstacle, Plant, Task, browser, differential_drive
-from nmpcrl.control.codegen.browser import FUNCTIONS, build, from_texts, ir, link
+from nmpcrl.control import Nmpc, Obstacle, Plant, Task, differential_drive
+from nmpcrl.control.browser import texts
+from nmpcrl.control.codegen import browser
+from nmpcrl.control.codegen.browser import from_texts
+from nmpcrl.control.codegen.browser.link import FUNCTIONS, PAGES
 from nmpcrl.control.solvers import stages
 from nmpcrl.report.live.training import LONGEST
 from nmpcrl.study import paper
@@ -21,13 +27,15 @@ THETA = np.array(paper.THETA_INIT)
 ROBOT = differential_drive()
 TOLERANCE = 1e-8  # of solves that may end an iteration apart, as they are solved to
 DEGENERATE = 13  # the seed of an optimum for which Python uses dense algebra
-FREE = """from numba import float64, njit
-
-@njit(float64(float64))
-def f(x):
-    return {}
-
+FREE = """import math
+from numba import float64, njit
+{}
 EXPORTS = (f,)
+"""
+OF_X = """
+@njit(float64(float64))
+def {}(x):
+    return {}
 """
 STEP = """from numba import carray, float64, int32, njit, types
 from .model import NU, NX, transition
@@ -42,8 +50,6 @@ def step(state, action, out):
 
 EXPORTS = (step,)
 """
-
-
 ARRAYS = """import numpy as np
 from numba import float64, njit
 
@@ -61,6 +67,11 @@ def f(calls):
 
 EXPORTS = (f,)
 """
+
+
+def of_x(body: str) -> dict[str, str]:
+    """A package with one function f of a number."""
+    return {"one": FREE.format(OF_X.format("f", body))}
 
 
 def relative(found, expected) -> float:
@@ -84,22 +95,47 @@ def drawn(seed: int) -> tuple[Nmpc, np.ndarray, np.ndarray, np.ndarray]:
     return nmpc, state, THETA * rng.uniform(0.3, 2.5, 9), rng.uniform(ROBOT.lower, ROBOT.upper)
 
 
+def plans(there: Controller, nmpc: Nmpc, theta: np.ndarray, steps: int) -> Iterator[Any]:
+    """Plans of both in the states of a rollout without noise; cost and next state are the same."""
+    state, plan, theirs = nmpc.task.start, None, None
+    for _ in range(steps):
+        plan, theirs = nmpc.solve(state, theta, plan), there.solve(state, theta, theirs)
+        yield theirs, plan
+        cost = nmpc.task.stage_cost(state, plan.action)
+        assert there.cost(state, plan.action) == pytest.approx(cost, rel=1e-12)
+        later = nmpc.plant.step(state, plan.action)
+        np.testing.assert_allclose(there.step(state, plan.action), later, rtol=1e-12, atol=1e-15)
+        state = later
+
+
 def test_a_rollout_without_noise_is_that_of_the_machine_code(robot_module):
     nmpc = paper.nmpc("A")
-    there = Controller(Module(robot_module), nmpc)
-    state = theirs = nmpc.task.start
-    plan = their_plan = None
-    cost = their_cost = 0.0
-    for _ in range(paper.STEPS):
-        plan = nmpc.solve(state, THETA, plan)
-        their_plan = there.solve(theirs, THETA, their_plan)
-        assert differs(their_plan, plan) < 1e-11
-        assert their_plan["iterations"] == plan.iterations
-        cost += nmpc.task.stage_cost(state, plan.action)
-        their_cost += there.cost(theirs, their_plan["action"])
-        state = ROBOT.step(state, plan.action)
-        theirs = there.step(theirs, their_plan["action"])
-    assert their_cost == pytest.approx(cost, rel=0, abs=1e-10)
+    for found, expected in plans(Controller(Module(robot_module), nmpc), nmpc, THETA, paper.STEPS):
+        assert differs(found, expected) < 1e-11
+        assert found["iterations"] == expected.iterations
+
+
+def test_a_plant_of_the_readers_own_compiles_as_well():
+    mass = Plant(
+        dynamics=lambda state, push: ca.vertcat(state[2:], push),
+        state_names=("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
+        action_names=("a_x [m/s2]", "a_y [m/s2]"),
+        lower=-np.ones(2),
+        upper=np.ones(2),
+    )
+    task = Task(
+        start=np.zeros(4),
+        target=np.array([4.0, 2.0, 0.0, 0.0]),
+        lower=np.full(4, -9.0),
+        upper=np.full(4, 9.0),
+        obstacles=(Obstacle(2.0, 0.5),),
+        weights=np.array([1.0, 1.0, 0.1, 0.1]),
+    )
+    nmpc = Nmpc(mass, task)
+    there = Controller(Module(from_texts(texts(mass, task))), nmpc)
+    theta = np.array([1, 1, 0.1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.1, 0.001])
+    for found, expected in plans(there, nmpc, theta, 20):
+        assert differs(found, expected) < TOLERANCE
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -131,13 +167,12 @@ def test_where_a_start_fails_the_next_one_is_tried_in_the_same_order(robot_modul
     seen = set()
     for seed in range(40):
         nmpc, state, theta, _ = drawn(seed)
-        there = Controller(Module(robot_module), nmpc)
-        rng = np.random.default_rng(seed)
         first = nmpc.solve(state, theta)
         broken = replace(first, point=first.point * np.nan)
-        known = {"fixed": 0, "numbers": broken.point}
-        later = state + rng.normal(scale=0.1, size=3)
-        expected, found = nmpc.solve(later, theta, broken), there.solve(later, theta, known)
+        later = state + np.random.default_rng(seed).normal(scale=0.1, size=3)
+        expected = nmpc.solve(later, theta, broken)
+        there = Controller(Module(robot_module), nmpc)
+        found = there.solve(later, theta, {"fixed": 0, "numbers": broken.point})
         assert found["restarts"] == expected.restarts
         assert differs(found, expected) < 1e-9
         seen.add(expected.restarts)
@@ -148,26 +183,6 @@ def test_a_module_asks_its_host_for_four_functions(robot_module):
     assert Module(robot_module).imports == ["cos", "log", "pow", "sin"]
 
 
-def test_two_builds_give_the_same_bytes(monkeypatch):
-    """The plant's step alone goes through every stage, in seconds instead of a minute."""
-    texts = {"model": stages.write(paper.nmpc("A").problem), "one": STEP}
-    monkeypatch.setattr(build, "_kept", lambda called: None)
-    assert from_texts(texts) == from_texts(texts)
-
-
-def test_what_was_made_once_is_kept_and_damage_is_noticed(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
-    texts = {"one": FREE.format("x + 1.0")}
-    first = from_texts(texts)
-    monkeypatch.setattr(ir, "compiled", lambda texts: pytest.fail("it was made once"))
-    assert from_texts(texts) == first
-    (kept,) = tmp_path.glob("*.wasm")
-    kept.write_bytes(kept.read_bytes()[:-1] + b"?")
-    monkeypatch.undo()
-    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
-    assert from_texts(texts) == first
-
-
 def test_the_largest_layout_fits_and_a_host_that_reserves_too_much_is_told(robot_module):
     module = Module(robot_module)
     obstacles = tuple(Obstacle(0.4 * k, 6.0) for k in range(MOST_OBSTACLES))
@@ -176,17 +191,12 @@ def test_the_largest_layout_fits_and_a_host_that_reserves_too_much_is_told(robot
     start = nmpc.task.start
     expected = nmpc.solve(start, THETA)
     assert differs(there.solve(start, THETA), expected) < 1e-9
+    end = PAGES * 65_536
     with pytest.raises(MemoryError):
-        module("reserve", 64 * 65_536)
-    left = 64 * 65_536 - module("reserve", 8)
-    module("reserve", left - 1000)  # too little is left for the solver's arrays
+        module("reserve", end)
+    module("reserve", end - module("reserve", 8) - 1000)  # too little is left for the solver
     with pytest.raises(MemoryError):
         there.solve(start, THETA)
-
-
-def test_arrays_are_given_back_when_nothing_refers_to_them_any_more():
-    """240 MB of them, one after the other, in the 4 MB of a module."""
-    assert Module(from_texts({"arrays": ARRAYS}))("f", 10_000) == 3.0 * sum(range(10_000)) + 10
 
 
 def test_solves_leak_no_memory(robot_module):
@@ -200,58 +210,48 @@ def test_solves_leak_no_memory(robot_module):
     assert there.module("reserve", 8) == before + 16
 
 
-def test_a_plant_of_the_readers_own_compiles_as_well():
-    mass = Plant(
-        dynamics=lambda state, push: ca.vertcat(state[2:], push),
-        state_names=("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
-        action_names=("a_x [m/s2]", "a_y [m/s2]"),
-        lower=-np.ones(2),
-        upper=np.ones(2),
-    )
-    task = Task(
-        start=np.zeros(4),
-        target=np.array([4.0, 2.0, 0.0, 0.0]),
-        lower=np.full(4, -9.0),
-        upper=np.full(4, 9.0),
-        obstacles=(Obstacle(2.0, 0.5),),
-        weights=np.array([1.0, 1.0, 0.1, 0.1]),
-    )
-    nmpc = Nmpc(mass, task)
-    theta = np.array([1, 1, 0.1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.1, 0.001])
-    there = Controller(Module(browser.module(mass, task)), nmpc)
-    state, plan, theirs = task.start, None, None
-    for _ in range(20):
-        plan, theirs = nmpc.solve(state, theta, plan), there.solve(state, theta, theirs)
-        assert differs(theirs, plan) < TOLERANCE
-        assert there.cost(state, plan.action) == pytest.approx(task.stage_cost(state, plan.action))
-        np.testing.assert_allclose(there.step(state, plan.action), mass.step(state, plan.action))
-        state = mass.step(state, plan.action)
+def test_arrays_are_given_back_when_nothing_refers_to_them_any_more():
+    """240 MB of them, one after the other, in the 4 MB of a module."""
+    assert Module(from_texts({"arrays": ARRAYS}))("f", 10_000) == 3.0 * sum(range(10_000)) + 10
+
+
+def test_a_call_too_deep_is_an_error():
+    module = Module(from_texts(of_x("f(x - 1.0) * f(x - 2.0) + x if x > 0.0 else 1.0")))
+    assert module("f", 2.0) == 4.0
+    with pytest.raises(RuntimeError):
+        module("f", 1e9)
+
+
+def test_a_module_is_made_once_with_the_same_bytes_and_again_after_damage(tmp_path, monkeypatch):
+    """The plant's step alone goes through every stage, in seconds instead of a minute."""
+    parts = {"model": stages.write(paper.nmpc("A").problem), "one": STEP}
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
+    first = from_texts(parts)
+    with monkeypatch.context() as patch:
+        patch.setattr(browser, "_made", raising(AssertionError("it is made")))
+        assert from_texts(parts) == first
+    (kept,) = tmp_path.glob("*.wasm.gz")
+    kept.write_bytes(kept.read_bytes()[:-1] + b"?")
+    assert from_texts(parts) == first
 
 
 def test_every_function_that_a_host_gives_is_called_with_its_own_arguments():
-    names = sorted(FUNCTIONS)
-    arguments = {"acosh": (1.3,), "atan2": (0.3, 2.5), "pow": (0.3, 2.5)}
-    text = "import math\nfrom numba import float64, njit\n"
-    for name in names:
-        second = ", 2.5" if name in ("atan2", "pow") else ""
-        text += f"""
-@njit(float64(float64))
-def of_{name}(x):
-    return math.{name}(x{second})
-"""
-    text += f"EXPORTS = ({', '.join(f'of_{name}' for name in names)},)"
+    more = {"acosh": (1.3,), "atan2": (0.3, 2.5), "pow": (0.3, 2.5)}
+    arguments = {name: more.get(name, (0.3,)) for name in sorted(FUNCTIONS)}
+    called = {name: ", ".join(["x", *map(str, one[1:])]) for name, one in arguments.items()}
+    functions = [OF_X.format(f"of_{name}", f"math.{name}({x})") for name, x in called.items()]
+    exports = ", ".join(f"of_{name}" for name in arguments)
+    text = FREE.format("".join(functions)).replace("(f,)", f"({exports})")
     module = Module(from_texts({"one": text}))
-    for name in names:
-        given = arguments.get(name, (0.3,))
-        expected = getattr(math, name)(*given)
-        assert module(f"of_{name}", given[0]) == pytest.approx(expected, rel=1e-15), name
+    for name, numbers in arguments.items():
+        expected = getattr(math, name)(*numbers)
+        assert module(f"of_{name}", numbers[0]) == pytest.approx(expected, rel=1e-15), name
 
 
-def test_what_a_host_does_not_have_is_refused_by_name():
-    with pytest.raises(link.CannotLink, match="erf"):
-        from_texts({"one": "import math\n" + FREE.format("math.erf(x)")})
-
-
-def test_what_numba_cannot_compile_is_refused_with_its_reason():
-    with pytest.raises(RuntimeError, match="nowhere"):
-        from_texts({"one": FREE.format("nowhere(x)")})
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [("math.erf(x)", "call erf, which a browser does not have"), ("nowhere(x)", "nowhere")],
+)
+def test_what_cannot_be_compiled_is_refused_by_name(body, reason):
+    with pytest.raises(RuntimeError, match=reason):
+        from_texts(of_x(body))

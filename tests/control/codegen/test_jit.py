@@ -1,14 +1,21 @@
-"""Machine code is compiled once, found again, and compiled again when something happened to it."""
+"""Machine code is compiled once, found again, compiled again after damage, and kept elsewhere where
+its folder fails or is open to others."""
 
+import errno
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from raising import raising
 
 from nmpcrl.control.codegen import folder, jit
+from nmpcrl.control.codegen.source import CannotCompile
 
 TEXT = """
 from numba import float64, njit
@@ -18,182 +25,248 @@ def double(x):
     return 2.0 * x
 """
 SCRIPT = f"""
-from nmpcrl.control.codegen.jit import load
-print(load("tiny", {{"__init__": {TEXT!r}}}, "Compiling ...").double(4.0))
-"""
-TURNS = f"""
 import os, sys
 from nmpcrl.control.codegen.jit import load
 for cache in sys.argv[1:]:
     os.environ["NMPCRL_CACHE"] = cache
     package = load("tiny", {{"__init__": {TEXT!r}}}, "Compiling ...")
-    print(package.double(4.0))
+    assert package.double(4.0) == 8.0
     print(cache, file=sys.stderr)
     del sys.modules[package.__name__]
 """
 SOLVE = """
 import numpy as np
 from nmpcrl.study import paper
-print(round(paper.nmpc().solve(np.array(paper.START), np.array(paper.THETA_INIT)).value))
+assert round(paper.nmpc().solve(np.array(paper.START), np.array(paper.THETA_INIT)).value) == 1037
 """
+ONCE = r"Compiling \.\.\. done in \d+ s\.\n"
+ELSEWHERE = "; machine code is kept in a temporary folder until this process ends"
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def said(cache: Path | None, script: str = SCRIPT, answer: str = "8.0") -> list[str]:
-    """What another process that needs the code prints on standard error."""
-    chosen = {} if cache is None else {"NMPCRL_CACHE": str(cache)}
-    command = [sys.executable, "-c", script]
-    ended = subprocess.run(command, capture_output=True, text=True, env=os.environ | chosen)
-    assert ended.returncode == 0, ended.stderr
-    assert ended.stdout.strip() == answer
-    return ended.stderr.splitlines()
-
-
-def said_in_turn(caches: list[Path]) -> list[list[str]]:
-    """What one process prints that looks for the code in one cache after the other."""
-    command = [sys.executable, "-c", TURNS, *map(str, caches)]
+def said(*caches: Path, script: str = SCRIPT) -> list[str]:
+    """What another process prints on standard error about each of these caches in turn."""
+    command = [sys.executable, "-c", script, *map(str, caches)]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
-    assert ended.stdout.split() == ["8.0"] * len(caches)
-    found: list[list[str]] = [[]]
-    for line in ended.stderr.splitlines():
-        if line == str(caches[len(found) - 1]):
-            found.append([])
-        else:
-            found[-1].append(line)
-    return found[:-1]
+    return re.split("|".join(f"{cache}\n" for cache in caches) or "$", ended.stderr)[:-1]
 
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory) -> Path:
     """A cache that a process found empty."""
     cache = tmp_path_factory.mktemp("cache")
-    first = said(cache)
-    assert len(first) == 1
-    assert first[0].startswith("Compiling ... done in ")
+    (first,) = said(cache)
+    assert re.fullmatch(ONCE, first)
     return cache
 
 
-@pytest.fixture
-def full(filled, tmp_path) -> Path:
-    """A cache of this test's own in which the code is already."""
-    return shutil.copytree(filled, tmp_path / "cache")
-
-
 @pytest.mark.slow
-def test_a_second_process_does_not_compile(full):
-    assert said(full) == []
-
-
-@pytest.mark.slow
-def test_a_process_finds_the_solver_that_another_compiled(controllers):
+def test_what_one_process_compiled_the_next_one_finds(filled, controllers):
+    assert said(filled) == [""]
     controllers["riccati"].solve([-2.5, 1.5, 0.0], [1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001])
-    assert said(None, SOLVE, "1037") == []
+    assert said(script=SOLVE) == [""]
 
 
-DAMAGES = [
-    ("*.nbi", "emptied"),
-    ("*.nbi", "cut"),
-    ("*.nbc", "emptied"),
-    ("*.nbc", "cut"),
-    ("*.nbc", "garbled"),
-    ("__init__.py", "emptied"),
-    ("__init__.py", "garbled"),
-]
-
-
-@pytest.fixture(scope="module")
-def after_damage(filled, tmp_path_factory) -> dict[tuple[str, str], list[list[str]]]:
-    """By damage: what the next process prints, and the one after it."""
-    folder, caches = tmp_path_factory.mktemp("damaged"), []
-    for number, (pattern, damage) in enumerate(DAMAGES):
-        caches.append(shutil.copytree(filled, folder / str(number)))
-        (file,) = caches[-1].rglob(pattern)
-        content = file.read_bytes()
-        changed = {"emptied": b"", "cut": content[: len(content) // 2], "garbled": b"= " + content}
-        file.write_bytes(changed[damage])
-    first, second = said_in_turn(caches), said_in_turn(caches)
-    return dict(zip(DAMAGES, map(list, zip(first, second, strict=True)), strict=True))
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "emptied": lambda content: b"",
+    "cut": lambda content: content[: len(content) // 2],
+    "garbled": lambda content: b"= " + content,
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("pattern", "damage"), DAMAGES)
-def test_a_damaged_file_is_noticed_and_compiled_again(after_damage, pattern, damage):
-    lines, later = after_damage[pattern, damage]
-    assert len(lines) == 2
-    assert "is damaged" in lines[0]
-    assert lines[0].endswith("and is compiled again")
-    assert lines[1].startswith("Compiling ... done in ")
-    assert later == []
+def test_damage_is_noticed_and_an_interrupted_compilation_repeated(filled, tmp_path):
+    caches = {}
+    for pattern in ("*.nbi", "*.nbc", "__init__.py", jit.COMPLETE):
+        for name, damage in DAMAGES.items():
+            cache = tmp_path / f"{len(caches)}"
+            (file,) = shutil.copytree(filled, cache).rglob(pattern)
+            file.write_bytes(damage(file.read_bytes()))
+            caches[pattern, name] = cache
+    missing = shutil.copytree(filled, tmp_path / "missing")
+    next(missing.rglob(jit.COMPLETE)).unlink()
+    first, second = (said(*caches.values(), missing) for _ in range(2))
+    for (pattern, name), found in zip(caches, first, strict=False):
+        again = "" if pattern == jit.COMPLETE else rf".* is damaged .* is compiled again\n{ONCE}"
+        assert re.fullmatch(again, found), (pattern, name)
+    assert re.fullmatch(ONCE, first[-1])
+    assert not any(second)
 
 
 @pytest.mark.slow
-def test_an_interrupted_compilation_is_repeated(full):
-    (complete,) = full.rglob(jit.COMPLETE)
-    complete.unlink()
-    lines = said(full)
-    assert len(lines) == 1
-    assert lines[0].startswith("Compiling ... done in ")
-    assert said(full) == []
+def test_of_two_processes_at_once_one_compiles(tmp_path):
+    command = [sys.executable, "-c", SCRIPT, str(tmp_path)]
+    started = [subprocess.Popen(command, stderr=-1, text=True) for _ in range(2)]
+    ends = [process.communicate(timeout=60)[1] for process in started]
+    assert [process.returncode for process in started] == [0, 0], ends
+    assert re.fullmatch(ONCE, "".join(ends).replace(f"{tmp_path}\n", ""))
 
 
-def test_an_interruption_leaves_nothing_that_counts_as_complete(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
-    text = TEXT + "\nraise KeyboardInterrupt\n"
-    with pytest.raises(KeyboardInterrupt):
-        jit.load("stopped", {"__init__": text})
-    assert not [*tmp_path.rglob(jit.COMPLETE)]
-    assert not [name for name in sys.modules if name.startswith("stopped_")]
+@pytest.fixture
+def cache(tmp_path, monkeypatch) -> Iterator[Path]:
+    """A cache of this test's own; packages that it imported are forgotten."""
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path / "cache"))
+    imported = set(sys.modules)
+    yield tmp_path / "cache"
+    for name in set(sys.modules) - imported:
+        if re.search(r"^[a-z]+_[0-9a-f]{16}", name):
+            del sys.modules[name]
 
 
-@pytest.mark.slow
-def test_two_processes_at_once_do_not_disturb_each_other(tmp_path):
-    command, chosen = [sys.executable, "-c", SCRIPT], {"NMPCRL_CACHE": str(tmp_path)}
-    started = [
-        subprocess.Popen(command, env=os.environ | chosen, stdout=-1, stderr=-1) for _ in range(2)
-    ]
-    for process in started:
-        out, _ = process.communicate(timeout=60)
-        assert out.strip() == b"8.0"
-    assert said(tmp_path) == []
+def packages(cache: Path) -> list[Path]:
+    return [path for path in cache.iterdir() if path.is_dir()]
 
 
-def test_other_text_or_another_numba_is_other_code(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
-    jit.load("tiny", {"__init__": "x = 1\n"})
-    jit.load("tiny", {"__init__": "x = 2\n"})
+def test_other_text_or_another_numba_is_other_code(cache, monkeypatch):
+    texts = {"__init__": "from .part import x\n", "part": "x = 1\n"}
+    assert jit.load("tiny", texts) is jit.load("tiny", texts)
+    assert jit.load("tiny", texts | {"part": "x = 2\n"}).x == 2
     monkeypatch.setattr(jit, "numba_version", lambda: "0.1")
-    assert jit.load("tiny", {"__init__": "x = 1\n"}).x == 1
-    assert len([*tmp_path.iterdir()]) == 3
+    assert jit.load("tiny", texts).x == 1
+    assert len(packages(cache)) == 3
 
 
 @pytest.mark.parametrize(
-    "chosen", [{}, {"XDG_CACHE_HOME": "/somewhere"}, {"NMPCRL_CACHE": "/here"}]
+    ("chosen", "place"),
+    [
+        ({}, Path.home() / ".cache/nmpcrl"),
+        ({"XDG_CACHE_HOME": "/somewhere"}, Path("/somewhere/nmpcrl")),
+        ({"XDG_CACHE_HOME": "/somewhere", "NMPCRL_CACHE": "/here"}, Path("/here")),
+    ],
 )
-def test_the_cache_is_where_the_user_wants_it(monkeypatch, chosen):
+def test_the_cache_is_where_the_user_wants_it(monkeypatch, chosen, place):
     for name in ("NMPCRL_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
-    for name, value in chosen.items():
-        monkeypatch.setenv(name, value)
-    places = {"XDG_CACHE_HOME": Path("/somewhere/nmpcrl"), "NMPCRL_CACHE": Path("/here")}
-    name = next(iter(chosen), None)
-    assert folder.chosen() == places.get(name, Path.home() / ".cache/nmpcrl")
+        if name in chosen:
+            monkeypatch.setenv(name, chosen[name])
+    assert folder.chosen() == place
 
 
-@pytest.mark.parametrize("error", [MemoryError(), ImportError("cannot map it")])
-def test_what_is_whole_and_cannot_be_loaded_stays(error, tmp_path, monkeypatch):
-    """A process with too little memory may not take from the others what they have compiled."""
-    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
-    texts = {"__init__": f"answer = 42  # after {type(error).__name__}\n"}
-    jit.load("whole", texts)
-    (complete,) = tmp_path.rglob(jit.COMPLETE)
-    sys.modules.pop(complete.parent.name)
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        (TEXT + "\nraise KeyboardInterrupt('now')\n", KeyboardInterrupt, "now"),
+        (TEXT + "\nfrom .part import missing\n", ImportError, "cannot import name 'missing'"),
+        (TEXT.replace("2.0 * x", "x.y"), CannotCompile, "numba cannot compile stopped_"),
+    ],
+)
+def test_what_cannot_be_imported_leaves_nothing(cache, capsys, text, error, words):
+    with pytest.raises(error, match=words):
+        jit.load("stopped", {"__init__": text, "part": ""})
+    assert capsys.readouterr().err == ""
+    assert not [*cache.rglob(jit.COMPLETE)]
+    assert not [name for name in sys.modules if name.startswith("stopped_")]
 
-    def fails(*_):
-        raise error
 
+def test_a_process_with_too_little_memory_removes_nothing(cache, monkeypatch):
+    texts = {"__init__": "answer = 42\n"}
+    del sys.modules[jit.load("complete", texts).__name__]
     with monkeypatch.context() as patch:
-        patch.setattr(jit.importing, "from_folder", fails)
+        patch.setattr(folder, "imported", raising(MemoryError()))
         with pytest.raises(MemoryError):
-            jit.load("whole", texts)
-    assert complete.is_file()
-    assert jit.load("whole", texts).answer == 42
+            jit.load("complete", texts)
+    assert [*cache.rglob(jit.COMPLETE)]
+    assert jit.load("complete", texts).answer == 42
+
+
+# Each makes a cache unfit, and returns the reason that is given.
+
+
+def below_a_file(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    cache.touch()
+    monkeypatch.setenv("NMPCRL_CACHE", str(cache / "below"))
+    return f"{cache / 'below'}: Not a directory"
+
+
+def read_only(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    may = os.access
+    monkeypatch.setattr(os, "access", lambda place, how: place != cache and may(place, how))
+    return f"{cache} cannot be written"
+
+
+def of_another_user(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    cache.mkdir(mode=0o700)
+    owner, stat = cache.stat().st_uid, Path.stat
+
+    def told(place: Path, **options: bool) -> os.stat_result:
+        about = list(stat(place, **options))
+        return os.stat_result([*about[:4], owner + (place == cache), *about[5:]])
+
+    monkeypatch.setattr(Path, "stat", told)
+    return f"{cache} belongs to another user"
+
+
+def open_to(mode: int) -> Callable[[Path, pytest.MonkeyPatch], str]:
+    def unfit(cache: Path, _: pytest.MonkeyPatch) -> str:
+        cache.mkdir()
+        cache.chmod(mode)
+        return f"others may write to {cache}, which `chmod go-w` ends"
+
+    return unfit
+
+
+def full(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    write = Path.write_bytes
+
+    def fails(path: Path, content: bytes) -> int:
+        if cache in path.parents:
+            raise FULL
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", fails)
+    return f"{cache}: No space left on device"
+
+
+def filled_by_numba(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    imported = folder.imported
+
+    def fails(place: Path):
+        if cache in place.parents:
+            raise FULL
+        return imported(place)
+
+    monkeypatch.setattr(folder, "imported", fails)
+    return f"{cache}: No space left on device"
+
+
+@pytest.mark.parametrize(
+    "unfit",
+    [below_a_file, read_only, of_another_user, open_to(0o770), open_to(0o707), full]
+    + [filled_by_numba],
+)
+def test_what_an_unfit_folder_cannot_keep_a_temporary_one_does(cache, monkeypatch, capsys, unfit):
+    reason = unfit(cache, monkeypatch)
+    found = [jit.load(name, {"__init__": "x = 1\n"}) for name in ("first", "second")]
+    assert capsys.readouterr().err.splitlines() == [reason + ELSEWHERE]
+    (place,) = {Path(one.__file__).parent.parent for one in found}
+    assert tempfile.gettempdir() == str(place.parent)
+    assert os.environ["NMPCRL_CACHE"] == str(place)  # workers find it there
+    assert not cache.is_dir() or not packages(cache)
+
+
+def test_where_no_folder_can_be_had_the_reason_is_raised(cache, monkeypatch):
+    cache.touch()
+    monkeypatch.setattr(tempfile, "mkdtemp", raising(FULL))
+    with pytest.raises(OSError, match="No space left on device"):
+        jit.load("nowhere", {"__init__": ""})
+
+
+def test_packages_are_the_users_alone_and_one_that_is_not_is_not_loaded(cache, capsys):
+    texts = {"__init__": "x = 1\n"}
+    found = jit.load("opened", texts)
+    place = Path(found.__file__).parent
+    assert place.parent == cache
+    assert {one.stat().st_mode & 0o077 for one in (cache, place)} == {0}
+    place.chmod(0o777)
+    del sys.modules[found.__name__]
+    assert not jit.load("opened", texts).__file__.startswith(str(cache))
+    reason = f"others may write to {place}, which `chmod go-w` ends"
+    assert capsys.readouterr().err.splitlines() == [reason + ELSEWHERE]
+
+
+def test_rights_are_not_asked_where_a_mode_tells_none(cache, monkeypatch):
+    cache.mkdir()
+    cache.chmod(0o777)
+    monkeypatch.delattr(os, "getuid")
+    assert jit.load("windows", {"__init__": ""}).__file__.startswith(str(cache))

@@ -1,17 +1,18 @@
 """LLVM IR of a package's functions to an object file for wasm32, with `runtime.ll` linked to it."""
 
 import re
+from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
 import llvmlite.binding as llvm
 
-from nmpcrl.control.codegen.browser.ir import Function, Package
+from nmpcrl.control.codegen.browser.ir import Function
 
 TRIPLE = "wasm32-unknown-unknown"
 FEATURES = "+sign-ext,+nontrapping-fptoint,+bulk-memory"  # in every browser since 2021
 RUNTIME = ("reserve", "release", "why")  # of runtime.ll, exported
-SET_LATER = ("bottom", "ceiling")  # by `link`: no constants
+STACK = "stack"  # which nothing names
 OVERFLOWING = "@llvm.smul.with.overflow.i64"
 FOR_A_MACHINE = re.compile(r"^target (?:datalayout|triple) = .*\n", flags=re.M)
 
@@ -38,47 +39,37 @@ returns:
 """
 
 
-def emit(package: Package) -> bytes:
-    """One object file of a package's functions."""
+def emit(functions: Sequence[Function], ir: str) -> bytes:
+    """One object file of functions and of all that they call."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple(TRIPLE)
     machine = target.create_target_machine(opt=3, reloc="static", features=FEATURES)
-    module = _parsed(package["ir"])
-    wrappers = [_wrapper(function, module) for function in package["functions"]]
+    ir = FOR_A_MACHINE.sub("", ir).replace(OVERFLOWING, "@product_of_sizes")
+    ir = ir.replace("alwaysinline", "inlinehint")  # a fifth smaller and 8 % slower: pages load it
+    module = llvm.parse_assembly(ir)
     runtime = files(__package__).joinpath("runtime.ll").read_text("utf-8")
+    wrappers = [_wrapper(function, module) for function in functions]
     whole = llvm.parse_assembly("\n".join([runtime, *wrappers]))
     whole.link_in(module)
     whole.triple = TRIPLE
     whole.data_layout = str(machine.target_data)
-    _keep(whole, {*RUNTIME, *SET_LATER, *(function["name"] for function in package["functions"])})
+    exported = {STACK, *RUNTIME, *(function.name for function in functions)}
+    for one in (*whole.functions, *whole.global_variables):
+        if not one.is_declaration:  # all but what is exported may be inlined, or dropped
+            one.linkage = "external" if one.name in exported else "internal"
     whole.verify()
     _optimise(whole, machine)
     return bytes(machine.emit_object(whole))
 
 
-def _parsed(ir: str) -> Any:
-    ir = FOR_A_MACHINE.sub("", ir).replace(OVERFLOWING, "@product_of_sizes")
-    ir = ir.replace("alwaysinline", "inlinehint")  # a fifth smaller and 8 % slower: pages load it
-    return llvm.parse_assembly(ir)
-
-
 def _wrapper(function: Function, module: Any) -> str:
-    _, _, *types = (str(one.type) for one in module.get_function(function["symbol"]).arguments)
+    _, _, *types = (str(one.type) for one in module.get_function(function.symbol).arguments)
     return WRAPPER.format(
-        symbol=function["symbol"],
-        name=function["name"],
-        result=function["result"],
+        **function._asdict(),
         types=", ".join(types),
         arguments=", ".join(f"{kind} %a{k}" for k, kind in enumerate(types)),
     )
-
-
-def _keep(module: Any, exported: set[str]) -> None:
-    """Let everything but what is exported be inlined, or dropped."""
-    for one in (*module.functions, *module.global_variables):
-        if not one.is_declaration:
-            one.linkage = "external" if one.name in exported else "internal"
 
 
 def _optimise(module: Any, machine: Any) -> None:

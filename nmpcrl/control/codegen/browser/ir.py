@@ -1,91 +1,86 @@
-"""A package of modules by their texts to LLVM IR.
+"""numba's compiler up to the LLVM IR: not optimised, not made machine code, not to be called.
 
-A process of its own, because numba reads what it may assume of a machine when it is imported: here
-nothing, so that the IR fits any machine with 64-bit floats. Nor does numba optimise it there and
-make machine code of it, which took most of the time and which nobody would call.
+Machine code took most of the time, and nobody would call it.
 """
 
-import json
-import os
-import subprocess
-import sys
+# mypy: allow-untyped-calls
+
+import tempfile
 from collections.abc import Mapping
-from typing import TypedDict
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from nmpcrl.control.codegen import importing
+from llvmlite import binding as llvm
+from numba.core import codegen, cpu
+from numba.core.registry import cpu_target
 
-UNASSUMING = {
-    "NUMBA_OPT": "0",
-    "NUMBA_CPU_NAME": "generic",
-    "NUMBA_CPU_FEATURES": "",
-    "NUMBA_LOOP_VECTORIZE": "0",
-    "NUMBA_SLP_VECTORIZE": "0",
-    "NUMBA_DISABLE_INTEL_SVML": "1",
-    "NUMBA_DISABLE_JIT": "0",
-}
+from nmpcrl.control.codegen import folder
+
 PACKAGE = "in_browser"
 TYPES = {"float64": "double", "int32": "i32"}  # of results, as LLVM calls them
 
 
-class Function(TypedDict):
-    """One that the module exports."""
+class Function(NamedTuple):
+    """A function that the module exports."""
 
     name: str
     symbol: str  # in the IR
     result: str  # its type
 
 
-class Package(TypedDict):
-    """Functions, and the LLVM IR of these and of all that they call."""
-
-    functions: list[Function]
-    ir: str
-
-
-def compiled(texts: Mapping[str, str]) -> Package:
-    """Every function in the `EXPORTS` of the modules.
-
-    Raises:
-        RuntimeError: numba cannot compile them; with the end of what it says.
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", f"from {__name__} import main; main()"],
-        input=json.dumps(dict(texts)),
-        env=os.environ | UNASSUMING,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode:
-        said = done.stderr.strip() or "it says nothing"
-        why = said.rpartition("numba.core.errors.")[2] if "numba.core.errors." in said else said
-        raise RuntimeError(f"numba cannot compile these functions for a browser: {why[-1000:]}")
-    package: Package = json.loads(done.stdout)
-    return package
-
-
-def main() -> None:
-    """Texts on standard input, the package on standard output, both as JSON."""
-    from llvmlite import binding as llvm
-
-    from nmpcrl.control.codegen.browser import context
-
-    context.install()
-    texts = {
-        module: text.replace(", cache=True", "") for module, text in json.load(sys.stdin).items()
-    }
+def described(texts: Mapping[str, str]) -> tuple[list[Function], str]:
+    """Every function in the `EXPORTS` of the modules, and the LLVM IR of all that they call."""
+    cpu_target._toplevel_target_context = DescribingContext(cpu_target.typing_context, "cpu")
     exporting = [module for module, text in texts.items() if "\nEXPORTS = " in text]
-    texts["__init__"] = "\n".join(f"from . import {module}" for module in exporting)
-    package = importing.from_memory(PACKAGE, texts)
+    init = "\n".join(f"from . import {module}" for module in exporting)
+    uncached = {module: text.replace(", cache=True", "") for module, text in texts.items()}
+    with tempfile.TemporaryDirectory() as parent:
+        place = Path(parent) / PACKAGE
+        folder.write(place, uncached | {"__init__": init})
+        package = folder.imported(place)
     functions, whole = [], llvm.parse_assembly("")
     for exported in (one for module in exporting for one in getattr(package, module).EXPORTS):
-        (signature,) = exported.signatures
-        result = exported.overloads[signature]
-        described = Function(
-            name=exported.__name__,
-            symbol=result.fndesc.llvm_func_name,
-            result=TYPES[str(result.signature.return_type)],
-        )
-        functions.append(described)
+        (result,) = exported.overloads.values()
+        kind = TYPES[str(result.signature.return_type)]
+        functions.append(Function(exported.__name__, result.fndesc.llvm_func_name, kind))
         whole.link_in(llvm.parse_bitcode(result.library.emit_bitcode()))
-    json.dump(Package(functions=functions, ir=str(whole)), sys.stdout)
+    return functions, str(whole)
+
+
+class Library(codegen.AOTCodeLibrary):
+    """The LLVM IR of a function and of all that it calls."""
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Zero, as numba's own gives for a function that is not here."""
+        self._ensure_finalized()
+        return 0
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        """Nothing: `emit` optimises all functions together, for the host that runs them."""
+
+
+class Codegen(codegen.AOTCPUCodegen):
+    """Makes such libraries."""
+
+    _library_class = Library
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Nothing: only calls from Python need a function's environment."""
+
+
+class DescribingContext(cpu.CPUContext):
+    """Compiles by making such libraries, without wrappers for Python and C."""
+
+    def init(self) -> None:
+        super().init()
+        self._describing = Codegen(PACKAGE, "generic")
+
+    def codegen(self) -> Codegen:
+        return self._describing
+
+    def create_cpython_wrapper(self, *_: Any, **__: Any) -> None: ...
+
+    def create_cfunc_wrapper(self, *_: Any, **__: Any) -> None: ...

@@ -1,276 +1,146 @@
 """A wasm32 object file to a module: what a linker would do, for one object that is nearly a module.
 
-The object imports a memory and a stack pointer; the module has both. Places in its code that name
-a symbol are written anew (relocated); constants find their place behind the stack, which comes
-first so that a call too deep is an error and overwrites nothing.
+LLVM has written the right indices into its code, and the right addresses for data that begin at 0.
+So the module differs by what the object imports, a memory and a stack pointer, and by its exports.
+The stack of `runtime.ll` comes first, so that a call too deep is an error and overwrites nothing.
 
 Source: the WebAssembly specification, section 5, and tool-conventions, "Linking".
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from io import BytesIO
 
-PAGE = 65_536  # bytes of a page of memory
-STACK = 65_536  # bytes
+PAGES = 64  # of 64 KiB; a solve with 40 planned inputs among 16 obstacles takes three of them
+STACK, BOTTOM = 65_536, 131_072  # addresses of `runtime.ll`: constants are between them
 FUNCTIONS = frozenset(  # what a module may import, from "env": JavaScript's Math has them
     ("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "exp", "expm1")
     + ("log", "log1p", "pow", "sin", "sinh", "tan", "tanh")
 )
 
 MAGIC = b"\0asm\1\0\0\0"
-CUSTOM, TYPE, IMPORT, FUNCTION, MEMORY, GLOBAL, EXPORT, CODE, DATA, DATA_COUNT = (
-    0, 1, 2, 3, 5, 6, 7, 10, 11, 12,
-)  # fmt: skip
+CUSTOM, TYPE, IMPORT, FUNCTION, MEMORY, GLOBAL, EXPORT, CODE, DATA = (*range(4), 5, 6, 7, 10, 11)
+SYMBOLS = 8  # a subsection of "linking"
 FUNCTION_SYMBOL, DATA_SYMBOL, GLOBAL_SYMBOL = 0, 1, 2
-SEGMENTS, SYMBOLS = 5, 8  # subsections of "linking"
 UNDEFINED, NAMED = 0x10, 0x40  # of a symbol's flags
-FUNCTION_INDEX, ADDRESS, SIGNED_ADDRESS, PLAIN_ADDRESS, TYPE_INDEX, GLOBAL_INDEX = 0, 3, 4, 5, 6, 7
-I32, MUTABLE, I32_CONST, END = 0x7F, 1, 0x41, 0x0B
 
 
-class CannotLink(RuntimeError):
+class CannotLink(Exception):
     """The object holds what no module of ours may hold; the message says what."""
 
 
-class Reader:
-    """Reads bytes from the front."""
+def link(data: bytes, exports: Iterable[str]) -> bytes:
+    """The module that exports these functions and its memory.
 
-    def __init__(self, data: bytes, at: int = 0) -> None:
-        self.data, self.at = data, at
-
-    def __bool__(self) -> bool:
-        return self.at < len(self.data)
-
-    def byte(self) -> int:
-        self.at += 1
-        return self.data[self.at - 1]
-
-    def take(self, count: int) -> bytes:
-        self.at += count
-        return self.data[self.at - count : self.at]
-
-    def number(self) -> int:
-        """An unsigned LEB128."""
-        value = shift = 0
-        while True:
-            byte = self.byte()
-            value |= (byte & 0x7F) << shift
-            shift += 7
-            if byte < 0x80:
-                return value
-
-    def signed(self) -> int:
-        """A signed LEB128."""
-        began = self.at
-        value = self.number()
-        bits = 7 * (self.at - began)
-        return value - (1 << bits) if value >> (bits - 1) else value
-
-    def name(self) -> str:
-        return self.take(self.number()).decode()
+    Raises:
+        CannotLink: it would need more of its host than `FUNCTIONS`.
+    """
+    sections = _sections(BytesIO(data))
+    indices = dict(_functions(BytesIO(sections[CUSTOM])))
+    exported = (_name(each) + b"\0" + _bytes(indices[each]) for each in exports)
+    body = {
+        TYPE: sections[TYPE],
+        IMPORT: _vector(_imports(BytesIO(sections[IMPORT]))),
+        FUNCTION: sections[FUNCTION],
+        MEMORY: _vector([b"\1" + _bytes(PAGES) + _bytes(PAGES)]),
+        GLOBAL: _vector([b"\x7f\1\x41" + _bytes(STACK) + b"\x0b"]),  # the stack's end, a variable
+        EXPORT: _vector([_name("memory") + b"\2\0", *exported]),
+        CODE: sections[CODE],
+        DATA: _vector(_constants(BytesIO(sections[DATA]))),
+    }
+    return MAGIC + b"".join(bytes([k]) + _bytes(len(part)) + part for k, part in body.items())
 
 
-def number(value: int, width: int = 0) -> bytes:
-    """Unsigned LEB128, of `width` bytes if that is given."""
+def _sections(data: BytesIO) -> dict[int, bytes]:
+    """The content of each section; of those with a name, only "linking"."""
+    found = {}
+    data.seek(len(MAGIC))
+    while kind := data.read(1):
+        content = data.read(_number(data))
+        if kind[0] != CUSTOM or content.startswith(_name("linking")):
+            found[kind[0]] = content
+    return found
+
+
+def _functions(linking: BytesIO) -> Iterator[tuple[str, int]]:
+    """Name and index of each function."""
+    linking.seek(len(_name("linking")))
+    _number(linking)  # version
+    while linking.read(1)[0] != SYMBOLS:
+        linking.read(_number(linking))
+    _number(linking)  # size
+    for _ in range(_number(linking)):
+        kind, flags = linking.read(1)[0], _number(linking)
+        if kind == DATA_SYMBOL:
+            called = _text(linking)
+            if flags & UNDEFINED:
+                raise CannotLink(f"{called} is nowhere")
+            for _ in range(3):  # segment, offset, size
+                _number(linking)
+        elif kind in (FUNCTION_SYMBOL, GLOBAL_SYMBOL):
+            index = _number(linking)
+            called = _text(linking) if not flags & UNDEFINED or flags & NAMED else ""
+            if kind == FUNCTION_SYMBOL:
+                yield called, index
+        else:
+            raise CannotLink(f"a symbol is of a kind, {kind}, that is not known here")
+
+
+def _imports(section: BytesIO) -> Iterator[bytes]:
+    """The imported functions; memory and stack pointer are the module's own."""
+    for _ in range(_number(section)):
+        module, called, kind = _text(section), _text(section), section.read(1)[0]
+        if called == "__linear_memory":
+            section.read(1)  # without a maximum
+            _number(section)
+        elif called == "__stack_pointer":
+            section.read(2)  # its type
+        elif kind == 0 and called in FUNCTIONS:
+            yield _name(module) + _name(called) + b"\0" + _bytes(_number(section))
+        else:
+            raise CannotLink(f"the functions call {called}, which a browser does not have")
+
+
+def _constants(section: BytesIO) -> Iterator[bytes]:
+    """The pieces of data that are not zero, as they are; the first piece is the stack."""
+    for number in range(_number(section)):
+        began = section.tell()
+        section.read(2)  # the address is a constant
+        address, _, content = _number(section), section.read(1), section.read(_number(section))
+        first, last = (STACK, BOTTOM) if number else (0, STACK)
+        if not first <= address <= last - len(content):
+            raise CannotLink(f"{len(content)} bytes of data are at {address}")
+        if any(content):
+            yield section.getvalue()[began : section.tell()]
+
+
+def _number(stream: BytesIO) -> int:
+    """The next LEB128, not negative."""
+    value = shift = 0
+    while True:
+        byte = stream.read(1)[0]
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80:
+            return value
+
+
+def _text(stream: BytesIO) -> str:
+    return stream.read(_number(stream)).decode()
+
+
+def _bytes(value: int) -> bytes:
+    """LEB128, unsigned."""
     out = bytearray()
-    while value > 0x7F or len(out) + 1 < width:
+    while value > 0x7F:
         out.append(value & 0x7F | 0x80)
         value >>= 7
     return bytes([*out, value])
 
 
-def vector(items: Iterable[bytes]) -> bytes:
+def _vector(items: Iterable[bytes]) -> bytes:
     items = list(items)
-    return number(len(items)) + b"".join(items)
+    return _bytes(len(items)) + b"".join(items)
 
 
-def name(text: str) -> bytes:
-    return number(len(text)) + text.encode()
-
-
-@dataclass(frozen=True)
-class Symbol:
-    """A function, or a piece of data."""
-
-    kind: int
-    name: str
-    index: int  # of the function, or of the data's segment
-    offset: int = 0  # in the segment
-
-
-def link(data: bytes, exports: Iterable[str], pages: int) -> bytes:
-    """The module that exports these functions and its memory, of so many pages.
-
-    Raises:
-        CannotLink: it would need more of its host than `FUNCTIONS`, or more memory than it has.
-    """
-    sections = _sections(data)
-    symbols = list(_symbols(sections["linking"]))
-    segments, begins = _segments(sections[DATA])
-    places, end = _placed(segments, _alignments(sections["linking"]))
-    if end >= pages * PAGE:
-        raise CannotLink(f"stack and constants take {end} bytes, and {pages} pages are fewer")
-    for symbol in symbols:
-        if symbol.kind == DATA_SYMBOL and symbol.name in ("bottom", "ceiling"):
-            value = end if symbol.name == "bottom" else pages * PAGE
-            segments[symbol.index][symbol.offset : symbol.offset + 4] = value.to_bytes(4, "little")
-    code = bytearray(sections[CODE])
-    for kind, at, index, addend in _relocations(sections.get("reloc.CODE")):
-        _relocate(code, kind, at, _value(kind, index, symbols, places) + addend)
-    for kind, at, index, addend in _relocations(sections.get("reloc.DATA")):
-        k = max(k for k, begin in enumerate(begins) if begin <= at)
-        value = _value(kind, index, symbols, places) + addend
-        _relocate(segments[k], kind, at - begins[k], value)
-    functions = {one.name: one.index for one in symbols if one.kind == FUNCTION_SYMBOL}
-    exported = (name(each) + b"\0" + number(functions[each]) for each in exports)
-    body = {
-        TYPE: sections[TYPE],
-        IMPORT: vector(_imports(sections[IMPORT])),
-        FUNCTION: sections[FUNCTION],
-        MEMORY: vector([b"\1" + number(pages) + number(pages)]),
-        GLOBAL: vector([bytes([I32, MUTABLE]) + _constant(STACK)]),
-        EXPORT: vector([name("memory") + b"\2\0", *exported]),
-        DATA_COUNT: number(len(segments)),
-        CODE: bytes(code),
-        DATA: vector(
-            b"\0" + _constant(place) + number(len(segment)) + segment
-            for place, segment in zip(places, segments, strict=True)
-        ),
-    }
-    return MAGIC + b"".join(bytes([k]) + number(len(part)) + part for k, part in body.items())
-
-
-def _sections(data: bytes) -> dict[int | str, bytes]:
-    """The sections by number, the custom ones by name."""
-    if not data.startswith(MAGIC):
-        raise CannotLink("this is no object file of WebAssembly")
-    found: dict[int | str, bytes] = {}
-    reader = Reader(data, len(MAGIC))
-    while reader:
-        kind, body = reader.byte(), Reader(reader.take(reader.number()))
-        called = body.name() if kind == CUSTOM else kind
-        found[called] = body.data[body.at :]
-    return found
-
-
-def _subsection(linking: bytes, wanted: int) -> Reader:
-    reader = Reader(linking)
-    reader.number()  # version
-    while reader:
-        kind, body = reader.byte(), reader.take(reader.number())
-        if kind == wanted:
-            return Reader(body)
-    raise CannotLink(f"the object has no subsection {wanted} of linking")
-
-
-def _symbols(linking: bytes) -> Iterator[Symbol]:
-    reader = _subsection(linking, SYMBOLS)
-    for _ in range(reader.number()):
-        kind, flags = reader.byte(), reader.number()
-        if kind == DATA_SYMBOL:
-            called = reader.name()
-            if flags & UNDEFINED:
-                raise CannotLink(f"{called} is nowhere")
-            index, offset, _ = reader.number(), reader.number(), reader.number()
-            yield Symbol(kind, called, index, offset)
-        elif kind in (FUNCTION_SYMBOL, GLOBAL_SYMBOL):
-            index = reader.number()
-            named = not flags & UNDEFINED or flags & NAMED
-            yield Symbol(kind, reader.name() if named else "", index)
-        else:
-            raise CannotLink(f"a symbol is of a kind, {kind}, that is not known here")
-
-
-def _imports(section: bytes) -> Iterator[bytes]:
-    """The imported functions alone, as they stand; the memory and the stack pointer are ours."""
-    reader, globals_ = Reader(section), 0
-    for _ in range(reader.number()):
-        module, called, kind = reader.name(), reader.name(), reader.byte()
-        if kind == 0:
-            if called not in FUNCTIONS:
-                raise CannotLink(f"the functions call {called}, which a browser does not have")
-            yield name(module) + name(called) + b"\0" + number(reader.number())
-        elif kind == 2:
-            limited = reader.byte()
-            reader.number()
-            if limited & 1:
-                reader.number()
-        elif kind == 3:
-            reader.take(2)
-            globals_ += 1
-            if called != "__stack_pointer" or globals_ > 1:
-                raise CannotLink(f"the functions need {called}, which is not known here")
-        else:
-            raise CannotLink(f"the functions need {called}, of a kind that is not known here")
-
-
-def _segments(section: bytes) -> tuple[list[bytearray], list[int]]:
-    """The pieces of data, and where in the section each begins."""
-    reader, segments, begins = Reader(section), [], []
-    for _ in range(reader.number()):
-        reader.take(2)  # flags, i32.const
-        reader.signed()
-        reader.byte()  # end
-        size = reader.number()
-        begins.append(reader.at)
-        segments.append(bytearray(reader.take(size)))
-    return segments, begins
-
-
-def _alignments(linking: bytes) -> list[int]:
-    """Of each segment, in bytes."""
-    reader, found = _subsection(linking, SEGMENTS), []
-    for _ in range(reader.number()):
-        reader.name()
-        found.append(1 << reader.number())
-        reader.number()  # flags
-    return found
-
-
-def _placed(segments: list[bytearray], alignments: list[int]) -> tuple[list[int], int]:
-    """The address of each segment behind the stack, and the first free one, a multiple of 16."""
-    places, end = [], STACK
-    for segment, alignment in zip(segments, alignments, strict=True):
-        end += -end % alignment
-        places.append(end)
-        end += len(segment)
-    return places, end + -end % 16
-
-
-def _relocations(section: bytes | None) -> Iterator[tuple[int, int, int, int]]:
-    """Kind, offset, symbol and what is added, of each."""
-    if section is None:
-        return
-    reader = Reader(section)
-    reader.number()  # which section
-    for _ in range(reader.number()):
-        kind, at, index = reader.byte(), reader.number(), reader.number()
-        addressed = kind in (ADDRESS, SIGNED_ADDRESS, PLAIN_ADDRESS)
-        yield kind, at, index, reader.signed() if addressed else 0
-
-
-def _value(kind: int, index: int, symbols: list[Symbol], places: list[int]) -> int:
-    """What a relocation puts in."""
-    if kind == TYPE_INDEX:
-        return index
-    symbol = symbols[index]
-    if kind in (FUNCTION_INDEX, GLOBAL_INDEX):
-        return symbol.index
-    if kind in (ADDRESS, SIGNED_ADDRESS, PLAIN_ADDRESS):
-        return places[symbol.index] + symbol.offset
-    raise CannotLink(f"a relocation is of a kind, {kind}, that is not known here")
-
-
-def _relocate(code: bytearray, kind: int, at: int, value: int) -> None:
-    """Write a value where a place for it was left: four bytes, or LEB128 of five."""
-    if kind == PLAIN_ADDRESS:
-        code[at : at + 4] = value.to_bytes(4, "little")
-    else:
-        code[at : at + 5] = number(value, 5)  # no address has the highest bit of a signed one
-
-
-def _constant(value: int) -> bytes:
-    """An expression: a number of 32 bits, not negative."""
-    plain = number(value)
-    signed = plain if not plain[-1] & 0x40 else number(value, len(plain) + 1)
-    return bytes([I32_CONST]) + signed + bytes([END])
+def _name(text: str) -> bytes:
+    return _bytes(len(text)) + text.encode()

@@ -2,14 +2,15 @@
 ;
 ; Memory: [stack | constants | what the host reserves | scratch, whole at the next call | end].
 
-@bottom = global i32 0   ; where scratch begins; `link` sets both
-@ceiling = global i32 0
+@stack = global [65536 x i8] zeroinitializer, align 16  ; `link` has these two numbers, too
+@bottom = global i32 131072  ; where scratch begins
 @heap = global i32 0     ; the first free byte of scratch
 @last = global i32 0     ; the array that ends there, or 0
 @fault = global i32 0    ; why a call was ended: 1 no memory, 2 a size, 3 an error of the function
 
 declare void @llvm.trap()
 declare double @llvm.sqrt.f64(double)
+declare i32 @llvm.wasm.memory.size.i32(i32)
 
 define void @end_call(i32 %why) noinline noreturn {
   store i32 %why, ptr @fault
@@ -26,7 +27,8 @@ small:
   %more = add i32 %bytes, 15
   %round = and i32 %more, -16
   %next = add i32 %from, %round
-  %ceiling = load i32, ptr @ceiling
+  %pages = call i32 @llvm.wasm.memory.size.i32(i32 0)
+  %ceiling = shl i32 %pages, 16
   %beyond = icmp ugt i32 %next, %ceiling
   br i1 %beyond, label %none, label %there
 none:
