@@ -18,15 +18,13 @@ from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.setup import controller_of
 from nmpcrl.study.store import Runs
 
-SOURCES = ("published", "fresh")
-
 
 def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
     """The runs of `design.main_table` to train here, and the run with theta frozen beside each.
 
     The source is "fresh" for all runs, or "published" for the runs that are not published.
     """
-    one_of(SOURCES).check("study", source)
+    one_of(("published", "fresh")).check("study", source)
     runs, known = _asked(**asked), load().summaries
     return tuple(e for e in runs if source == "fresh" or e not in known)
 

@@ -37,7 +37,6 @@ WORDS = {REPRODUCED: "confirmed", PARTLY: "confirmed in part", NOT: "contradicte
 
 Row: TypeAlias = dict[str, Any]
 Arms: TypeAlias = Mapping[str, Any]  # the setting of each arm, by its name
-Run: TypeAlias = Callable[[Any, str, int, int], Row]  # (setting, place, episodes, seed)
 
 
 class Condition(NamedTuple):
@@ -61,7 +60,7 @@ class Part:
     which may raise a `Refusal` while it is incomplete.
     """
 
-    run: Run
+    run: Callable[[Any, str, int, int], Row]  # (setting, place, episodes, seed)
     arms: Arms | Callable[[pd.DataFrame], Arms]
     places: Sequence[str]
     episodes: int
@@ -404,12 +403,12 @@ def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:
 
 
 def lower(
-    part: str, first: str, second: str, unit: str = "layouts", column: str = "cost"
+    part: str, first: str, second: str, unit: str = "layouts"
 ) -> Callable[[pd.DataFrame], Answer]:
-    """Asked of each place: is the first arm below the second?"""
+    """Asked of each place: does the first arm cost less than the second?"""
 
     def answer(table: pd.DataFrame) -> Answer:
-        both = means(table, part, column).reindex(columns=[first, second]).dropna()
+        both = means(table, part).reindex(columns=[first, second]).dropna()
         return share(both[first] < both[second], unit)
 
     return answer

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import pandas as pd
 
 from nmpcrl.bench.learners import REFERENCE, ratio
 from nmpcrl.bench.paired import Ratio
@@ -40,23 +39,21 @@ class TimeClaim(Claim):
     work: str  # the reason for the ratio, in words
 
     def judge(self, observed: Observations) -> Verdict:
-        """The verdict, by `decide`; not decidable without times."""
-        ratios = self.ratios(observed.timings)
-        if self.solver not in ratios:
-            return self.verdict(UNDECIDABLE)
-        ratio = ratios[self.solver]
-        interval = None if np.isnan(ratio.low) else (ratio.low, ratio.high)
-        outcome = decide(ratio, self.claimed, self.near)
-        return self.verdict(outcome, ratio=ratio.value, interval=interval, numbers=ratios)
+        """The verdict, by `decide`, with the ratio of each solver; the solver of the claim first.
 
-    def ratios(self, timings: pd.DataFrame) -> dict[str, Ratio]:
-        """Time of a step over that of ES, by solver; the one that decides comes first."""
-        if timings.empty:
-            return {}
-        timed = timings.groupby("solver").learner.agg(set)
-        solvers = [name for name in timed.index if {self.learner, REFERENCE} <= timed[name]]
-        ordered = sorted(solvers, key=lambda name: name != self.solver)
-        return {name: ratio(timings, name, self.learner) for name in ordered}
+        Not decidable without times.
+        """
+        timings = observed.timings
+        learners = timings.groupby("solver").learner.agg(set) if len(timings) else {}
+        timed = [name for name, those in learners.items() if {self.learner, REFERENCE} <= those]
+        if self.solver not in timed:
+            return self.verdict(UNDECIDABLE)
+        ordered = sorted(timed, key=lambda name: name != self.solver)
+        ratios = {name: ratio(timings, name, self.learner) for name in ordered}
+        own = ratios[self.solver]
+        interval = None if np.isnan(own.low) else (own.low, own.high)
+        outcome = decide(own, self.claimed, self.near)
+        return self.verdict(outcome, ratio=own.value, interval=interval, numbers=ratios)
 
 
 def decide(ratio: Ratio, claimed: Range, near: Range) -> Outcome:
