@@ -16,7 +16,7 @@ from nmpcrl.study.moving import CLEARANCE, TASK, Motion, World, centres, inside
 GRID = 0.1  # [m], of the points at which crowding is counted
 
 
-class Counted(NamedTuple):
+class Contacts(NamedTuple):
     """Contacts of a robot with obstacles."""
 
     inside: int  # states in an obstacle
@@ -29,15 +29,15 @@ class Encounters:
 
     states: Matrix  # true ones, shape (<= K + 2, 3)
     cost: float  # infinite where a solve failed
-    counted: Counted
+    contacts: Contacts
     arrived: bool
 
 
-def count(states: Matrix, motions: Sequence[Motion]) -> Counted:
+def count(states: Matrix, motions: Sequence[Motion]) -> Contacts:
     """Count the states in an obstacle, and the entries."""
     there = inside(states, motions)
     entered = there[1:] & ~there[:-1]
-    return Counted(int(there.any(axis=1).sum()), int(entered.sum() + there[:1].sum()))
+    return Contacts(int(there.any(axis=1).sum()), int(entered.sum() + there[:1].sum()))
 
 
 def judged(nmpc: Nmpc, theta: Vector, world: World, seed: int = 0) -> Encounters:

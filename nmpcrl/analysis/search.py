@@ -30,7 +30,7 @@ LEAST = 40  # rollouts of the shortest search: the first one and some generation
 Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
 
 
-class Tried:
+class Rollouts:
     """The rollouts of a search, at most `budget`, at points in units of `SCALE`."""
 
     lower, upper = LOWER / SCALE, UPPER / SCALE
@@ -84,7 +84,7 @@ class Tried:
 
 def grid(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
     """Theta with the best theta_c of `POINTS`, the start's and equidistant ones up to `WIDEST`."""
-    tried = Tried(cost, start, budget)
+    tried = Rollouts(cost, start, budget)
     for theta_c in np.linspace(start[-1], WIDEST, POINTS)[1:][: tried.left]:
         tried(np.r_[start[:-1], theta_c] / SCALE)
     return tried.theta
@@ -100,7 +100,7 @@ def spsa(
     c_k = perturbed / (k + 1)^0.101; the first step is `step` long in each component, and no later
     one is longer. The last rollout of an even budget judges the last theta. Source: Spall (1998).
     """
-    tried, rng = Tried(cost, start, budget), np.random.default_rng(seed)
+    tried, rng = Rollouts(cost, start, budget), np.random.default_rng(seed)
     point, delay, a, k = np.asarray(start, float) / SCALE, budget / 20, 0.0, 0
     while tried.left >= 2:
         signs = rng.choice([-1.0, 1.0], point.size)
@@ -121,7 +121,7 @@ def cma_es(
     cost: Cost, start: Vector, budget: int, seed: int = 0, *, spread: float = SPREAD
 ) -> Vector:
     """CMA-ES, restarted from the best point after convergence; the last generation may be cut."""
-    tried, again = Tried(cost, start, budget), 0
+    tried, again = Rollouts(cost, start, budget), 0
     while tried.left:
         tried.descend(spread, 1 + (seed + 7919 * again) % (2**31 - 2))  # 0 would mean the clock
         again += 1
@@ -138,7 +138,7 @@ def bayesian(
     """
     import optuna
 
-    tried = Tried(cost, start, budget)
+    tried = Rollouts(cost, start, budget)
     first = {f"{k}: {name}": one for k, (name, one) in
              enumerate(zip(paper.THETA_NAMES, tried.best.tolist(), strict=True))}  # fmt: skip
     lower = np.maximum(tried.lower, tried.best - nearby)
@@ -181,7 +181,7 @@ class Search:
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """The result of a search and each improvement; the first rollout is under theta_init."""
 
     theta: tuple[float, ...]
@@ -209,15 +209,17 @@ class Found:
         return self.best[bisect(self.rollouts, rollouts) - 1]
 
 
-def search(wanted: Search) -> Found:
+def search(wanted: Search) -> SearchResult:
     """The theta of least noise-free cost in a layout that one CMA-ES finds from theta_init."""
     controller = paper.nmpc(wanted.layout)
     start = np.array(paper.THETA_INIT)
-    tried = Tried(lambda theta: evaluate(controller, theta, paper.STEPS).cost, start, wanted.budget)
+    tried = Rollouts(
+        lambda theta: evaluate(controller, theta, paper.STEPS).cost, start, wanted.budget
+    )
     tried.descend(SPREAD, wanted.seed + 1, least=0)
     lowest = np.minimum.accumulate(tried.costs)
     fell = np.flatnonzero(np.r_[True, lowest[1:] < lowest[:-1]])
-    return Found(
+    return SearchResult(
         theta=tuple((tried.points[fell[-1]] * SCALE).tolist()),
         made=len(tried.costs),
         rollouts=tuple((fell + 1).tolist()),
@@ -225,7 +227,7 @@ def search(wanted: Search) -> Found:
     )
 
 
-def search_all(searches: Collection[Search]) -> dict[Search, Found]:
+def search_all(searches: Collection[Search]) -> dict[Search, SearchResult]:
     """`search` for many, in parallel."""
     found = dict(parallel(search, searches))
     return {one: found[one] for one in searches}

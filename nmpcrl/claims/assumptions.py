@@ -32,23 +32,23 @@ class TheoremClaim(Claim):
 
 
 @dataclass(frozen=True)
-class Measured:
-    """Three numbers of a run of GES that the assumptions are compared with."""
+class Measurement:
+    """Three numbers of a run of GES, which the assumptions are compared with."""
 
     kinks: float  # share of its steps that start exactly on a boundary
     memory: float  # correlation of consecutive TD errors
     dropped: float  # size of the curvature term beside the printed direction, median
 
 
-def measured(experiment: Experiment, records: Records, curvature: Curvature) -> Measured:
+def measured(experiment: Experiment, records: Records, curvature: Curvature) -> Measurement:
     """The numbers of one run of GES."""
     kinks, delta = metrics.boundary_share(records, experiment.task), records.steps["delta"]
     delta = delta[np.isfinite(delta)]
     memory = float(np.corrcoef(delta[:-1], delta[1:])[0, 1])
-    return Measured(kinks, memory, float(np.median(curvature.ratio)))
+    return Measurement(kinks, memory, float(np.median(curvature.ratio)))
 
 
-def audit(experiment: Experiment, found: Measured) -> tuple[Assumption, ...]:
+def audit(experiment: Experiment, found: Measurement) -> tuple[Assumption, ...]:
     """The assumptions of `THEOREMS`, beside one run of GES."""
     a, b = experiment.alpha, experiment.beta
     rows = (

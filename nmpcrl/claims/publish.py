@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
-from nmpcrl.analysis.search import Found, Search, search_all
+from nmpcrl.analysis.search import Search, SearchResult, search_all
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published
-from nmpcrl.claims.assumptions import Measured, measured
+from nmpcrl.claims.assumptions import Measurement, measured
 from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import BITS, COLUMNS, FOLLOWED, Evidence, Published
 from nmpcrl.claims.rule import judge
@@ -51,7 +51,7 @@ def publish_runs(
     variants: Mapping[Experiment, str],
     *,
     anew: bool = False,
-    audit: Measured | None = None,
+    audit: Measurement | None = None,
 ) -> Path:
     """Publish runs that were trained here beside the published ones, in the folder returned.
 
@@ -89,7 +89,7 @@ def _hours(runs: pd.DataFrame) -> float:
     return float(runs.seconds.sum() / 3600)
 
 
-def publish_searches(searches: Mapping[Search, Found]) -> Path:
+def publish_searches(searches: Mapping[Search, SearchResult]) -> Path:
     """Replace the published searches."""
     rows = [asdict(one) | asdict(result) for one, result in searches.items()]
     return _written(published.SEARCHES, pd.DataFrame(rows), made_here())

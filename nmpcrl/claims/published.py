@@ -21,10 +21,10 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
-from nmpcrl.analysis.search import Found, Search
+from nmpcrl.analysis.search import Search, SearchResult
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import assumptions
-from nmpcrl.claims.assumptions import Measured
+from nmpcrl.claims.assumptions import Measurement
 from nmpcrl.claims.failure_modes import FAILURE_MODE, WELL, failure_modes
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS, WIDER_CLAIMS
@@ -147,7 +147,7 @@ class Published(Evidence):
 
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     about: Mapping[str, Any] = field(default_factory=dict)  # the manifest's entry of the runs
-    searches: Mapping[Search, Found] = field(default_factory=dict)
+    searches: Mapping[Search, SearchResult] = field(default_factory=dict)
     timed: Mapping[str, Any] = field(default_factory=dict)  # date, machine and so on of `timings`
 
     @property
@@ -177,7 +177,7 @@ class Published(Evidence):
     @cached_property
     def _main(self) -> Observations:
         found = [one["audit"] for one in self.batches if "audit" in one]
-        made = assumptions.audit(AUDITED, Measured(**found[-1])) if found else ()
+        made = assumptions.audit(AUDITED, Measurement(**found[-1])) if found else ()
         return Observations(self.main.runs, self.paths, self.timings, made)
 
     @cached_property
@@ -216,8 +216,8 @@ def _table(name: str, place: Path) -> pd.DataFrame:
     return store.read(name, place) if store.about(name, place) else pd.DataFrame()
 
 
-def _search(row: Any) -> tuple[Search, Found]:
-    found = Found(tuple(row.theta), row.made, tuple(row.rollouts), tuple(row.best))
+def _search(row: Any) -> tuple[Search, SearchResult]:
+    found = SearchResult(tuple(row.theta), row.made, tuple(row.rollouts), tuple(row.best))
     return Search(row.layout, row.seed, row.budget), found
 
 

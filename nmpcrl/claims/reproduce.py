@@ -176,7 +176,7 @@ def agreement(fresh: Mapping[Experiment, RunSummary], published: Published) -> A
     return Agreement(len(mine), len(mine) - len(differing), close, *_verdicts(mine, published))
 
 
-class Relocked(NamedTuple):
+class Proof(NamedTuple):
     """The proof on which a new lock rests."""
 
     lock: Path
@@ -200,7 +200,7 @@ def _interleaved(groups: Iterable[Iterable[Experiment]]) -> list[Experiment]:
     return [e for turn in zip_longest(*groups) for e in turn if e is not None]
 
 
-def relock(known: Published, count: int, *, workers: int | None = None) -> Relocked:
+def relock(known: Published, count: int, *, workers: int | None = None) -> Proof:
     """Train `count` runs afresh, and write the lock if all have the bits that locked code made.
 
     A fresh run is compared with the published run, if such a machine made it, else with the run
@@ -208,7 +208,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     says which bit has changed, or what lacks a comparison.
     """
     if lock.locked()["epochs"] != provenance.EPOCHS:
-        return Relocked(lock.relock(), 0, 0)
+        return Proof(lock.relock(), 0, 0)
     drawn = sample(known.variants, count)
     exact = comparable(drawn, known)
     before: dict[Experiment, Row] = {e: known.rows[e] for e in exact}
@@ -231,7 +231,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
         )
     for experiment, one in fresh.items():  # the next edit is compared with these
         SUMMARIES.keep(experiment, one)
-    return Relocked(lock.relock(), len(exact), len(drawn) - len(exact))
+    return Proof(lock.relock(), len(exact), len(drawn) - len(exact))
 
 
 def _stored_by_lock(e: Experiment) -> RunSummary | None:

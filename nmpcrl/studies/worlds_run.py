@@ -131,7 +131,7 @@ def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Ro
     world = World(SCENARIOS[place], PREDICTORS[view])
     nmpc = controller(obstacles=len(world.motions))
     made = judged(nmpc, theta_of(policy, nmpc, world, begin(nmpc), episodes, seed), world)
-    return row(made.cost, *made.counted, made.arrived)
+    return row(made.cost, *made.contacts, made.arrived)
 
 
 def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
@@ -144,7 +144,7 @@ def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row
     draws = DRAWS if fault.slip or any(fault.noise) else 1
     made = [judged(nmpc, theta, world, draw) for draw in range(draws)]
     cost = float(np.mean([each.cost for each in made]))
-    inside, collisions = np.sum([each.counted for each in made], axis=0).tolist()
+    inside, collisions = np.sum([each.contacts for each in made], axis=0).tolist()
     return row(cost, inside, collisions, all(each.arrived for each in made), theta.tolist())
 
 
@@ -179,7 +179,7 @@ def terminal(kind: str, place: str, episodes: int, seed: int) -> Row:
     start = begin(nmpc)
     theta = theta_of("ES", nmpc, world, start, episodes, seed)
     initial, made = (judged(nmpc, each, world) for each in (start, theta))
-    return row(made.cost / initial.cost, *made.counted, made.arrived, theta.tolist())
+    return row(made.cost / initial.cost, *made.contacts, made.arrived, theta.tolist())
 
 
 CONTROLLERS = {  # kind and number of obstacles, by part; others have ("diagonal", 4)

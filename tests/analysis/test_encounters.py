@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.encounters import Counted, count, crowding, judged
+from nmpcrl.analysis.encounters import Contacts, count, crowding, judged
 from nmpcrl.study import paper
 from nmpcrl.study.faults import FAULTS
 from nmpcrl.study.moving import Straight, World, controller, still
@@ -14,10 +14,10 @@ THETA = np.array(paper.THETA_INIT)
 def test_states_inside_and_entries_are_counted_by_hand():
     passing = [Straight((-2.0, 0.0), (5.0, 0.0))]  # 1 m a step: -2, -1, 0, 1, 2, 3
     states = np.zeros((6, 3))
-    assert count(states, passing) == Counted(inside=3, collisions=1)
-    assert count(states, [Straight((0.0, 0.5))]) == Counted(6, 1)  # entered at the start
-    assert count(states, [*passing, Straight((-2.0, 0.0), (5.0, 0.0))]) == Counted(3, 2)
-    assert count(states, still([(3.0, 0.0)])) == Counted(0, 0)
+    assert count(states, passing) == Contacts(inside=3, collisions=1)
+    assert count(states, [Straight((0.0, 0.5))]) == Contacts(6, 1)  # entered at the start
+    assert count(states, [*passing, Straight((-2.0, 0.0), (5.0, 0.0))]) == Contacts(3, 2)
+    assert count(states, still([(3.0, 0.0)])) == Contacts(0, 0)
 
 
 def test_a_rollout_is_judged_by_its_true_states():

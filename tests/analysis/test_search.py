@@ -118,7 +118,7 @@ def test_a_search_begins_as_one_with_a_smaller_budget_and_seeds_differ(bowl, mon
     assert search(Search(budget=100, seed=1)).theta != search(Search(budget=100)).theta
     monkeypatch.setattr(searching, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
     failed = search(Search(budget=LEAST))
-    assert failed == searching.Found(paper.THETA_INIT, failed.made, (1,), (np.inf,))
+    assert failed == searching.SearchResult(paper.THETA_INIT, failed.made, (1,), (np.inf,))
 
 
 @pytest.mark.slow

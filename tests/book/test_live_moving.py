@@ -34,7 +34,7 @@ def assert_equal_to_python(shown: dict) -> None:
         found = judged(moving.controller(4), np.array(given["theta"]), around)
         assert not robot["failed"]
         assert robot["costs"][-1] == pytest.approx(found.cost, rel=1e-6)
-        assert robot["inside"][-1] == found.counted.inside
+        assert robot["inside"][-1] == found.contacts.inside
         np.testing.assert_allclose(robot["states"], found.states[: paper.STEPS], atol=1e-4)
 
 

@@ -18,7 +18,7 @@ from nmpcrl.analysis.rows import experiment_of, table
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims import own_claims, thresholds
-from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measured, audit, measured
+from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measurement, audit, measured
 from nmpcrl.claims.by_runs import AtLeast, AtMost, halves
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN, kept_without_noise
 from nmpcrl.claims.rule import Observations, judge
@@ -413,10 +413,10 @@ GRADIENT = "the update follows the gradient of the MSPBE, curvature included"
 @pytest.mark.parametrize(
     ("beta", "found", "holding"),
     [
-        (1e-7, Measured(0.1, 0.5, 0.1), {}),
-        (2e-7, Measured(0.1, 0.5, 0.1), {FASTER: THEOREMS}),
-        (1e-8, Measured(0.0, 0.5, 0.1), {SMOOTH_VALUE: (SMOOTH,)}),
-        (1e-8, Measured(0.1, 0.5, 0.0), {GRADIENT: (SMOOTH,)}),
+        (1e-7, Measurement(0.1, 0.5, 0.1), {}),
+        (2e-7, Measurement(0.1, 0.5, 0.1), {FASTER: THEOREMS}),
+        (1e-8, Measurement(0.0, 0.5, 0.1), {SMOOTH_VALUE: (SMOOTH,)}),
+        (1e-8, Measurement(0.1, 0.5, 0.0), {GRADIENT: (SMOOTH,)}),
     ],
 )
 def test_settings_and_measurements_can_meet_three_assumptions_of_nine(beta, found, holding):

@@ -10,10 +10,10 @@ import pytest
 from quiet_rows import timings
 
 from nmpcrl.analysis.rows import row
-from nmpcrl.analysis.search import Found, Search
+from nmpcrl.analysis.search import Search, SearchResult
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import publish, published
-from nmpcrl.claims.assumptions import Measured
+from nmpcrl.claims.assumptions import Measurement
 from nmpcrl.claims.paper_claims import WIDER_THAN
 from nmpcrl.claims.published import FOLLOWED, Damaged, Published, load
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
@@ -32,8 +32,8 @@ RUNS = (
 )
 LABELS = {e: "main" if e.horizon == paper.HORIZON else "N = 2" for e in RUNS}
 TIMES = pd.DataFrame({"solver": ["ipopt"], "learner": ["ES"], "ratio": [1 / 3]})
-SEARCHES = {Search("B", budget=40): Found((0.1, 1 / 3), 31, (1, 7), (1 / 3, 0.1))}
-AUDIT = Measured(0.1, 2 / 3, 0.5)
+SEARCHES = {Search("B", budget=40): SearchResult((0.1, 1 / 3), 31, (1, 7), (1 / 3, 0.1))}
+AUDIT = Measurement(0.1, 2 / 3, 0.5)
 
 
 @pytest.fixture(scope="module")

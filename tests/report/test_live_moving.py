@@ -56,11 +56,11 @@ def test_the_scene_shows_what_the_chapter_says():
             found = judged(moving.controller(4), theta, moving.World(SCENE, PREDICTORS[view]))
             assert found.arrived
             seen[view, c > 0.3] = found
-    assert seen["frozen", False].counted.inside > 20
+    assert seen["frozen", False].contacts.inside > 20
     for margin in (False, True):
-        assert seen["extrapolated", margin].counted.inside == 0
+        assert seen["extrapolated", margin].contacts.inside == 0
         assert seen["frozen", margin].cost > 1.3 * seen["extrapolated", margin].cost
-    assert seen["frozen", True].counted.inside == 0
+    assert seen["frozen", True].contacts.inside == 0
 
 
 @pytest.fixture(scope="module")
@@ -86,4 +86,4 @@ def test_the_modules_drive_as_python_does(modules, view, motions):
         state = there.step(state, plan["action"])
     found = judged(moving.controller(4), THETA, moving.World(motions, PREDICTORS[view]))
     assert cost == pytest.approx(found.cost, rel=1e-6)
-    assert count(np.array(states), motions) == found.counted
+    assert count(np.array(states), motions) == found.contacts

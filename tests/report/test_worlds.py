@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.encounters import Counted, Encounters
+from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report import worlds
@@ -40,7 +40,7 @@ def test_what_is_not_decided_is_not_listed():
 
 def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_not_touch():
     states = np.zeros((paper.STEPS + 1, 3))
-    one = Encounters(states, 0.0, Counted(0, 0), arrived=False)
+    one = Encounters(states, 0.0, Contacts(0, 0), arrived=False)
     assert worlds.deepest(one, still([(3.0, 0.0), (1.0, 0.0)])) == pytest.approx(0.25)
     assert worlds.deepest(one, still([(3.0, 0.0)])) == 0
 

@@ -34,7 +34,7 @@ def test_the_same_run_has_the_same_numbers_and_another_seed_others(part, arm, pl
 def test_a_frozen_view_fares_as_its_world_says():
     row = ran("moving", "frozen init", FOUR)
     made = judged(controller(), THETA, World(SCENARIOS[FOUR], frozen))
-    assert (row["cost"], row["inside"], row["collisions"]) == (made.cost, *made.counted)
+    assert (row["cost"], row["inside"], row["collisions"]) == (made.cost, *made.contacts)
 
 
 def test_a_body_that_draws_is_judged_by_several_rollouts(monkeypatch):

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nmpcrl import Matrix
-from nmpcrl.analysis.search import Found
+from nmpcrl.analysis.search import SearchResult
 from nmpcrl.analysis.trajectory import describe
 from nmpcrl.report.figures.axes import below, draw_task, map_grid
 from nmpcrl.report.figures.style import LOOKS, TEAL, WINE, headed, page, subplots
@@ -29,7 +29,7 @@ NAMES = {
 
 
 @page
-def searches(found: Mapping[str, Found]) -> Figure:
+def searches(found: Mapping[str, SearchResult]) -> Figure:
     """The lowest noise-free cost so far over the rollouts of each search, by layout."""
     figure, axes = subplots(height=3.0)
     greys = np.linspace(0.0, 0.55, len(found))

@@ -54,7 +54,7 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
         panels[view].set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         _map(figure, panels[view], at, ways[view], moment, view)
     _curves(figure, panels["near"], near, moment)
-    counts = {view: seen[view].counted.inside for view in VIEWS}
+    counts = {view: seen[view].contacts.inside for view in VIEWS}
     known, extrapolated, frozen = counts.values()
     return headed(
         figure,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from nmpcrl.analysis.search import Found
+from nmpcrl.analysis.search import SearchResult
 from nmpcrl.report.figures.learners import policy_search
 from nmpcrl.study import paper
 
@@ -12,7 +12,7 @@ HALFWAY = THERE[:15].repeat(2, axis=0)  # ... and one that does not
 
 def test_the_searches_are_named_without_overlap_and_summed_up():
     found = {
-        name: Found(paper.THETA_INIT, 100, (1, 50), (100.0, end))
+        name: SearchResult(paper.THETA_INIT, 100, (1, 50), (100.0, end))
         for name, end in (("A", 90.0), ("B", 95.0), ("C", 95.1))
     }
     figure = policy_search.searches(found)

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.encounters import Counted, Encounters
+from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.report.figures.moving import PLAY, SECONDS
 from nmpcrl.report.figures.runs import views as figures
 from nmpcrl.report.figures.sheet import NARROW, WIDE
@@ -23,7 +23,7 @@ INSIDE = dict(zip(VIEWS, (0, 7, 24), strict=True))
 def figure():
     way = np.linspace([-2.5, 1.5, 0.0], [8.5, 2.0, 0.0], paper.STEPS + 1)
     return figures.views(
-        MOTIONS, {view: Encounters(way, 4000.0, Counted(n, 1), True) for view, n in INSIDE.items()}
+        MOTIONS, {view: Encounters(way, 4000.0, Contacts(n, 1), True) for view, n in INSIDE.items()}
     )
 
 
