@@ -1,8 +1,5 @@
 """Why a solve can have failed: what is not finite, or grows too fast, where a plan begins."""
 
-from collections.abc import Callable
-from typing import Any
-
 import casadi as ca
 import numpy as np
 
@@ -35,9 +32,8 @@ class Diagnosis:
     """The functions of an OCP and their derivatives, looked at without planning anything."""
 
     def __init__(self, ocp: Ocp) -> None:
-        self._ocp = ocp
         of, e = ocp.problem, ocp.problem.expressions
-        z, data = ca.vertcat(e.x, e.u), ca.SX.sym("d", of.data_names.size)
+        self._problem, z, data = of, ca.vertcat(e.x, e.u), ca.SX.sym("d", of.data_names.size)
         given = [e.x, e.u, e.theta, data]
         costs = [e.next_x, e.stage, e.terminal, e.initial]
         model, stage, terminal, initial = ca.substitute(costs, [e.d], [data[: of.own_names.size]])
@@ -45,45 +41,48 @@ class Diagnosis:
         parts = {"model": model, "stage": stage, "rows": rows, "initial": initial}
         sharp = {"model": model, "stage": stage, "terminal": terminal, "rows": rows}
         self._kinks = {name: kinks_in(written, z) for name, written in sharp.items()}
-        self._orders: dict[str, dict[str, Callable[..., Any]]] = {order: {} for order in ORDERS}
+        self._functions: dict[str, ca.Function] = {}
         for name, written in parts.items():
             slope = ca.jacobian(written, z)
             bend = ca.reshape(ca.jacobian(ca.vec(slope), z), written.numel(), z.numel() ** 2)
-            for order, values in zip(self._orders, (written, slope, bend), strict=True):
-                self._orders[order][name] = ca.Function("part", given, [ca.densify(values)])
+            orders = [ca.densify(one) for one in (written, slope, bend)]
+            self._functions[name] = ca.Function(name, given, orders)
 
     def why(self, state: Vector, theta: Vector, data: Matrix) -> str:
         """What is wrong on the way that no input leads to, in one sentence; "" if nothing is."""
-        N = len(self._ocp.inputs)
-        for i in range(N):
-            given = state, self._ocp.problem.still, theta, data[i]
-            said = self._not_finite(*given) or self._too_fast(i + 1, *given)
+        for i in range(self._problem.horizon):
+            at = state, self._problem.still
+            values = {
+                name: [order.full() for order in function(*at, theta, data[i])]
+                for name, function in self._functions.items()
+            }
+            said = self._not_finite(values) or self._too_fast(i + 1, *values["model"])
             if said:
-                return said.format(f"at x = {short(state)}, u = {short(self._ocp.problem.still)}")
-            state = self._orders[""]["model"](*given).full().ravel()
+                return said.format("at x = {}, u = {}".format(*map(short, at)))
+            state = values["model"][0].ravel()
         for name, kinks in self._kinks.items():
             if kinks:
                 return f"{name} has a kink ({', '.join(kinks)}); {ROUND}"
         return ""
 
-    def _not_finite(self, *given: Vector) -> str:
-        for order, functions in self._orders.items():
-            for name, function in functions.items():
-                values = function(*given).full()
-                for row in np.flatnonzero(~np.isfinite(values).all(axis=1)):
-                    what = values[row][~np.isfinite(values[row])][0]
-                    called = order + place(name, int(row), len(values))
-                    return f"{called} is {what} {{}}: {ORDERS[order]}"
+    def _not_finite(self, values: dict[str, list[Matrix]]) -> str:
+        """Which function or derivative is not finite, with a place for where."""
+        for order, (of, advice) in enumerate(ORDERS.items()):
+            for name, orders in values.items():
+                found = orders[order]
+                for row, column in np.argwhere(~np.isfinite(found)):
+                    called = of + place(name, int(row), len(found))
+                    return f"{called} is {found[row, column]} {{}}: {advice}"
         return ""
 
-    def _too_fast(self, steps: int, *given: Vector) -> str:
-        value, slope, _ = (functions["model"] for functions in self._orders.values())
-        speed = slope(*given).full()[:, : self._ocp.states.shape[1]]
-        growth, largest = np.abs(np.linalg.eigvals(speed)).max(), np.abs(value(*given).full()).max()
+    def _too_fast(self, steps: int, value: Matrix, slope: Matrix, _: Matrix) -> str:
+        """How fast the model is, or how far it has led."""
+        growth = np.abs(np.linalg.eigvals(slope[:, : self._problem.states])).max()
         if growth > FASTEST:
             does = f"makes {growth:.1g} times as much of a small deviation in one step"
             return f"model {does}, {{}}: {SUBSTEPS}"
-        if largest > FARTHEST:
+        if np.abs(value).max() > FARTHEST:
+            largest = np.abs(value).max()
             return f"model leads to {largest:.1g} in {steps} steps at rest: {UNSTABLE}"
         return ""
 

@@ -8,8 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nmpcrl import Vector
-
 IF = "a Python `if`, `max` or `and` cannot wait for numbers: write ca.if_else(...), ca.fmax(...)"
 INFINITE = "write a large number, or leave out what has no bound"
 NAN = "math's functions make nan of a symbol: write ca.sin(x) for math.sin(x), and so on"
@@ -29,7 +27,7 @@ def expression(
         ValueError: it is no such expression.
     """
     if function is None:
-        return ca.SX(size, 1) if size > 1 else ca.SX(0)
+        return ca.SX(0)
     signature = [key for key, one in symbols.items() if one is not None and one.numel()]
     call = f"{name}({', '.join('th' if key == 'theta' else key for key in signature)})"
     if not callable(function):
@@ -40,7 +38,7 @@ def expression(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FutureWarning)  # CasADi's, of np.sin and its like
-            written = column(function(*arguments))
+            written = _column(function(*arguments))
     except ValueError:
         raise
     except Exception as error:
@@ -54,7 +52,9 @@ def expression(
     if not written.numel() or size not in (0, written.numel()):
         needed = f"{size} {unit}{'s' if size > 1 else ''}" if size else f"a {unit} or more"
         raise ValueError(f"{name} returns {written.numel()} numbers; it must return {needed}")
-    _refuse_unusable(name, written, [one for one in symbols.values() if one is not None])
+    _refuse_unusable(
+        name, written, ca.vertcat(*(one for one in symbols.values() if one is not None))
+    )
     return written
 
 
@@ -69,7 +69,12 @@ def mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
     return ""
 
 
-def column(result: Any) -> ca.SX | None:
+def place(name: str, row: int, size: int) -> str:
+    """What an entry of an expression is called: "model[1]", or "stage" where there is one."""
+    return f"{name}[{row}]" if size > 1 else name
+
+
+def _column(result: Any) -> ca.SX | None:
     """A result as a column; None if it is none."""
     if isinstance(result, ca.MX):
         return None
@@ -82,13 +87,9 @@ def column(result: Any) -> ca.SX | None:
     return ca.densify(ca.vec(written)) if 1 in written.shape else None
 
 
-def place(name: str, row: int, size: int) -> str:
-    """What an entry of an expression is called: "model[1]", or "stage" where there is one."""
-    return f"{name}[{row}]" if size > 1 else name
-
-
-def _refuse_unusable(name: str, written: ca.SX, allowed: list[ca.SX]) -> None:
-    known = {one.__hash__() for vector in allowed for one in ca.vertsplit(vector)}
+def _refuse_unusable(name: str, written: ca.SX, allowed: ca.SX) -> None:
+    """Refuse symbols besides the `allowed` ones, and numbers that are not finite."""
+    known = {one.__hash__() for one in ca.vertsplit(allowed)}
     for row, entry in enumerate(ca.vertsplit(written)):
         called = place(name, row, written.numel())
         for symbol in ca.symvar(entry):
@@ -97,21 +98,14 @@ def _refuse_unusable(name: str, written: ca.SX, allowed: list[ca.SX]) -> None:
                     f"{called} uses {symbol}, which is none of its arguments: make it a parameter"
                     " in theta, or data"
                 )
-        constants = _constants(entry)
-        if np.isnan(constants).any():
-            raise ValueError(f"{called} holds nan: {NAN}")
-        if np.isinf(constants).any():
-            raise ValueError(f"{called} holds {constants[np.isinf(constants)][0]}: {INFINITE}")
+        flat = ca.Function("flat", ca.symvar(entry), [entry])
+        for k in range(flat.n_instructions()):
+            constant = flat.instruction_constant(k)
+            if flat.instruction_id(k) == ca.OP_CONST and not np.isfinite(constant):
+                advice = NAN if np.isnan(constant) else INFINITE
+                raise ValueError(f"{called} holds {constant}: {advice}")
     try:
-        ca.jacobian(written, ca.vertcat(*allowed))
+        ca.jacobian(written, allowed)
     except Exception as error:
         reason = str(error).strip().splitlines()[-1]
         raise ValueError(f"{name} cannot be differentiated by CasADi: {reason}") from error
-
-
-def _constants(entry: ca.SX) -> Vector:
-    """The numbers in an expression."""
-    flat = ca.Function("flat", ca.symvar(entry), [entry])
-    places = range(flat.n_instructions())
-    found = [flat.instruction_constant(k) for k in places if flat.instruction_id(k) == ca.OP_CONST]
-    return np.array(found, float)

@@ -11,7 +11,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.content import Described, TracedFunction
-from nmpcrl.control.expression import column, expression
+from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import box, positive_integer
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
@@ -63,9 +63,7 @@ class Plant(Described):
         if not 0 < self.period < np.inf:
             raise ValueError(f"plant.period = {self.period} must be a positive number of seconds")
         positive_integer("plant.substeps", self.substeps)
-        state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
-        symbols = {"state": state, "action": action}
-        expression("dynamics", self.dynamics, (state, action), symbols, self.n, "state")
+        _ = self._derivative  # refused here, and not where it is first used
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields, with the dynamics as an expression: a function need not have a name."""
@@ -82,16 +80,22 @@ class Plant(Described):
         return len(self.action_names)
 
     @cached_property
+    def _symbols(self) -> dict[str, ca.SX]:
+        return {"state": ca.SX.sym("state", self.n), "action": ca.SX.sym("action", self.m)}
+
+    @cached_property
     def _derivative(self) -> ca.Function:
-        state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
-        return ca.Function("dynamics", [state, action], [self._written(state, action)])
+        """The dynamics, which may have been written as a list."""
+        given = (*self._symbols.values(),)
+        written = expression("dynamics", self.dynamics, given, self._symbols, self.n, "state")
+        return ca.Function("dynamics", given, [written])
 
     @cached_property
     def transition(self) -> ca.Function:
         """The discrete dynamics f(state, action) of Eq. (18), as a CasADi function."""
-        state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
-        later = rk4(self._written, state, action, self.period, self.substeps)
-        return ca.Function("f", [state, action], [later], ["state", "action"], ["later"])
+        given = (*self._symbols.values(),)
+        later = rk4(self._derivative, *given, self.period, self.substeps)
+        return ca.Function("f", given, [later], [*self._symbols], ["later"])
 
     def step(self, state: Vector, action: Vector) -> Vector:
         """The state one period later, shape (n,): Eq. (18)."""
@@ -100,12 +104,6 @@ class Plant(Described):
     @cached_property
     def _step(self) -> Callable[[Vector, Vector], Vector]:
         return callable_of(self.transition, scalar=False)
-
-    def _written(self, state: ca.SX, action: ca.SX) -> ca.SX:
-        """The dynamics as a column, which may have been written as a list."""
-        written = column(self.dynamics(state, action))
-        assert written is not None  # or there would be no plant
-        return written
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.content import Described
 from nmpcrl.control.plant import Plant
@@ -112,21 +112,26 @@ class Task(Described):
 
         One compilation serves all targets, boxes, layouts and horizons of a plant.
         """
+        soft, hard, data = [], {}, {"target": self.target}
         sides = [
             (k, sign, float(limit[k]))
             for sign, limit in ((-1, self.lower), (1, self.upper))
             for k in np.flatnonzero(np.isfinite(limit)).tolist()
         ]
-        box = Soft(lambda x, *_: [s * (x[k] - at) for k, s, at in sides], slack_weight,
-                   slice(1, None))  # fmt: skip
-        discs = Soft(
-            lambda x, u, th, d: overlap(x[0], x[1], *ca.vertsplit(d["discs"])) + th["c"],
-            slack_weight,
-            each="discs",
-        )
-        hard: dict[str, Any] = (
-            {} if self.soft_box else {"state_lower": self.lower, "state_upper": self.upper}
-        )
+        if not self.soft_box:
+            hard = {"state_lower": self.lower, "state_upper": self.upper}
+        elif sides:
+            soft.append(Soft(lambda x, *_: [s * (x[k] - at) for k, s, at in sides], slack_weight,
+                             slice(1, None)))  # fmt: skip
+        if plant.n > 1:
+            data["discs"] = np.reshape(np.transpose(self.discs), (-1, 3))
+            soft.append(
+                Soft(
+                    lambda x, u, th, d: overlap(x[0], x[1], *ca.vertsplit(d["discs"])) + th["c"],
+                    slack_weight,
+                    each="discs",
+                )
+            )
         return Problem(
             states=plant.n,
             inputs=plant.m,
@@ -136,17 +141,12 @@ class Task(Described):
             model=lambda x, u, *_: plant.transition(x, u),
             stage=lambda x, u, th, d: stage_cost(x, u, Theta(**th), d["target"]),
             terminal=lambda x, th, d: terminal_cost(x, Theta(**th), d["target"]),
-            soft=[*([box] if self.soft_box and sides else []), *([discs] if plant.n > 1 else [])],
+            soft=soft,
             lower=plant.lower,
             upper=plant.upper,
-            data={"target": self.target} | ({"discs": self._lines} if plant.n > 1 else {}),
+            data=data,
             **hard,
         )
-
-    @property
-    def _lines(self) -> Matrix:
-        """Centre and d_rob + d_obs of each obstacle, shape (M, 3)."""
-        return np.reshape(np.transpose(self.discs), (-1, 3))
 
     def overlap(self, state: Any) -> Any:
         """Xi of Eq. (19), one value an obstacle: positive inside, 1 at the centre.
@@ -176,10 +176,10 @@ class Task(Described):
 
     def stage_cost(self, state: Vector, action: Vector) -> float:
         """The RL stage cost l(s, a), Eq. (20)."""
-        inputs, known = len(action), self._charges
-        if inputs not in known:
-            known[inputs] = callable_of(self.charge(inputs))
-        return known[inputs](state, action, NO_DATA)
+        inputs = len(action)
+        if inputs not in self._charges:
+            self._charges[inputs] = callable_of(self.charge(inputs))
+        return self._charges[inputs](state, action, NO_DATA)
 
     @cached_property
     def _charges(self) -> dict[int, Callable[..., float]]:
