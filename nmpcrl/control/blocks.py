@@ -49,11 +49,7 @@ class Blocks(Mapping[str, tuple[int, ...]]):
         return found
 
     def filled(self, base: Matrix, values: Mapping[str, Any]) -> Matrix:
-        """A copy of `base`, vectors along its last axis, with these arrays in their places.
-
-        Raises:
-            ValueError: a name or a shape is another, or a number is not finite.
-        """
+        """A copy of `base`, vectors along its last axis, with these arrays in their places."""
         copy = np.array(base, float)
         for name, value in values.items():
             shape, whole = self[name], (*copy.shape[:-1], *self[name])
@@ -87,11 +83,7 @@ def unknown(what: str, name: str, known: Iterable[str]) -> ValueError:
 
 
 def numbers(name: str, value: Any, *, empty: bool = False) -> Matrix:
-    """An array of at most two axes, and not `empty` unless that is allowed.
-
-    Raises:
-        ValueError: it holds something else than finite numbers.
-    """
+    """An array of finite numbers, not `empty` unless that is allowed; ValueError for all else."""
     try:
         array = np.array(value, float)
     except (TypeError, ValueError):

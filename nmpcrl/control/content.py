@@ -10,7 +10,6 @@ import hashlib
 import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
 from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
@@ -20,8 +19,10 @@ import casadi as ca
 import numpy as np
 
 PLAIN = (type(None), bool, int, float, complex, str, bytes, range, type(Ellipsis))
-AROUND = (property, cached_property, staticmethod, classmethod, type(cache(abs)))
-WITHIN = ("fget", "fset", "func", "__wrapped__")  # the functions of these
+AROUND = (
+    property, cached_property, staticmethod, classmethod, type(cache(abs)), partial, MethodType,
+)  # fmt: skip
+WITHIN = ("fget", "fset", "func", "args", "keywords", "__wrapped__", "__self__", "__name__")
 OWN = "nmpcrl"  # whose code the epochs of `provenance` stand for
 
 
@@ -50,25 +51,12 @@ class Described:
 
     @property
     def key(self) -> str:
-        """A hash of all that it does, the same in every process and on every machine.
-
-        Of a class of the user's, or an object with a method of its own, that is the code, too, with
-        all that it reads of its module.
+        """A hash of the fields, the same everywhere, and of the code of a user's class or method.
 
         Raises:
-            NoContent: such a class or object holds what may be different each time.
+            NoContent: a field may be different each time.
         """
         return key_of(type(self), self.__getstate__())
-
-
-@dataclass(frozen=True)
-class TracedFunction:
-    """A function of the user as its CasADi expression, so that it can be pickled."""
-
-    function: ca.Function
-
-    def __call__(self, *arguments: ca.SX) -> Any:
-        return self.function(*arguments)
 
 
 def key_of(*values: Any) -> str:
@@ -98,10 +86,6 @@ def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
         return value.serialize()
     if isinstance(value, AROUND):
         return [content(getattr(value, name, None), inside) for name in WITHIN]
-    if isinstance(value, partial):
-        return [content(one, inside) for one in (value.func, value.args, value.keywords)]
-    if isinstance(value, MethodType):
-        return [value.__name__, content(value.__self__, inside)]
     if isinstance(value, ModuleType | FunctionType | BuiltinFunctionType | type):
         return _defined(value, inside)
     return _instance(value, inside)

@@ -21,11 +21,7 @@ def expression(
     size: int,
     unit: str,
 ) -> ca.SX:
-    """What a function of the user writes down: a column of `size` entries, of any size if 0.
-
-    Raises:
-        ValueError: it is no such expression.
-    """
+    """A user's function as a column of `size` entries, any if 0; ValueError for all else."""
     if function is None:
         return ca.SX(0)
     signature = [key for key, one in symbols.items() if one is not None and one.numel()]

@@ -6,7 +6,6 @@
 
 import math
 import time
-import warnings
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -15,14 +14,13 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.bending import Bending
-from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.content import Described, key_of
 from nmpcrl.control.diagnosis import FARTHEST
-from nmpcrl.control.ocp import Ocp, transcribe
+from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, short
-from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
+from nmpcrl.control.solvers import Fatrop, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
@@ -37,7 +35,9 @@ HORIZON, GAMMA, SLACK_WEIGHT = 10, 0.97, 100.0
 class Nmpc(Described):
     """Eq. (2) for one plant and one task, or a `Problem`, as a function of state and theta.
 
-    It can be pickled and copied; a copy solves as the original does, to the last bit.
+    It can be pickled and copied; a copy solves as the original does, to the last bit. Derivatives
+    beyond the gradient raise `DerivativeError`, a `SolverError`, where the optimum moves in a
+    direction without curvature.
     """
 
     def __init__(
@@ -89,13 +89,14 @@ class Nmpc(Described):
         of = self.problem
         self.horizon, self.gamma, self.n, self.m = of.horizon, of.gamma, of.states, of.inputs
         self.largest = max(ABSURD, 1e3 * float(np.abs(of.theta).max()))  # number in theta
-        box = np.abs([of.state_lower, of.state_upper])
-        reach = 100 * box[np.isfinite(box)].max(initial=0)
-        far = max(FAR, reach) if reach else FARTHEST * max(1.0, *of.sizes[0])
-        self.farthest = far  # number in a state
         self.lower, self.upper = of.lower, of.upper
-        bounds = np.abs([of.lower, of.upper])
-        self._strong = max(self.farthest, bounds[np.isfinite(bounds)].max(initial=0))
+        reach, strength = (
+            np.abs(box)[np.isfinite(box)].max(initial=0.0)
+            for box in (np.array([of.state_lower, of.state_upper]), np.array([of.lower, of.upper]))
+        )
+        far = max(FAR, 100 * reach) if reach else FARTHEST * max(1.0, *of.sizes[0])
+        self.farthest = far  # number in a state
+        self._strongest = max(far, strength)  # number in an action
         self.ties_active = ties_active
 
     def solve(
@@ -118,7 +119,6 @@ class Nmpc(Described):
             data: of a problem: arrays by name, each of one stage or with an axis of N + 1 in front.
 
         Raises:
-            ValueError: an argument has the wrong shape, is not finite, or is absurdly large.
             SolverError: no optimum was found; carries the status, the state and theta.
         """
         began = time.perf_counter()
@@ -129,7 +129,7 @@ class Nmpc(Described):
             self._bending.judge(state, theta, known)
         given: tuple[Vector, ...] = ()
         if action is not None:
-            action = _checked("action", action, self.m, self._strong)
+            action = _checked("action", action, self.m, self._strongest)
             if (action < self.lower).any() or (action > self.upper).any():
                 bounds = f"{short(self.lower)} and {short(self.upper)}"
                 raise ValueError(f"action {short(action)} must lie between {bounds}")
@@ -139,7 +139,7 @@ class Nmpc(Described):
             return variant.solve(state, theta, warm_start, *given, began=began, data=known)
         except SolverError as error:
             why, other = variant.diagnosis.why(state, theta, known), ""
-            if self._solves.name != Riccati.name:  # which asked fatrop itself
+            if not isinstance(variant.solver, Compiled):  # which asked fatrop itself
                 other = f"try solver={Riccati.name!r}, which begins in more ways"
             said = "; ".join(filter(None, (error.status, why, other)))
             if said == error.status:
@@ -147,20 +147,11 @@ class Nmpc(Described):
             raise type(error)(said, state, theta) from error
 
     def value_hessian(self, solution: Solution) -> Matrix:
-        """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`.
-
-        Raises:
-            DerivativeError: as `policy_jacobian`.
-        """
+        """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
         return self._variant(solution).hessian(solution)
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
-        """The product of `value_hessian` with a vector of shape (d,); in microseconds by riccati.
-
-        Raises:
-            ValueError: the vector has another shape, is not finite or is absurdly large.
-            DerivativeError: as `policy_jacobian`.
-        """
+        """`value_hessian` times a vector of shape (d,); in microseconds by riccati."""
         vector = _checked("vector", vector, solution.theta.size, self.largest)
         return self._variant(solution).hessian_times(solution, vector)
 
@@ -170,18 +161,11 @@ class Nmpc(Described):
         In microseconds an input by riccati. At a bound or row that is just reached, where the
         policy has a kink, it lies between the derivatives of the two sides; where more is reached
         than the inputs can follow, it is that of the side to which theta grows: see `Sensitivity`.
-
-        Raises:
-            DerivativeError: a `SolverError`: the optimum moves in a direction without curvature.
         """
         return self._variant(solution).policy(solution)
 
     def policy_feedback(self, solution: Solution) -> Matrix:
-        """du_0 / ds, shape (m, n): how the policy answers to the state; 0 where u_0 is given.
-
-        Raises:
-            DerivativeError: as `policy_jacobian`.
-        """
+        """du_0 / ds, shape (m, n): how the policy answers to the state; 0 where u_0 is given."""
         return self._variant(solution).feedback(solution)
 
     def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
@@ -210,18 +194,6 @@ class Nmpc(Described):
         """The problem with u_0 free, in symbols, an `Ocp`."""
         return self._free.ocp
 
-    def _prepared(self, ocp: Ocp) -> Prepared:
-        """The solver for a problem; fatrop, and a warning, where there is no machine code."""
-        try:
-            return self._solves.prepare(ocp)
-        except CannotCompile as error:
-            instead = Fatrop(self.solver.tolerance)
-            warnings.warn(
-                f"{error}: {instead.name} solves instead of {self.solver.name}", stacklevel=2
-            )
-            self._solves = instead
-        return self._solves.prepare(ocp)
-
     def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
@@ -229,11 +201,6 @@ class Nmpc(Described):
     def _bending(self) -> Bending:
         """Of a problem's costs."""
         return Bending(self.problem)
-
-    @cached_property
-    def _solves(self) -> Solver:
-        """The solver, or what took over."""
-        return self.solver
 
     @cached_property
     def _free(self) -> Variant:
@@ -246,7 +213,7 @@ class Nmpc(Described):
     def _with(self, *, fix_action: bool) -> Variant:
         """The problem transcribed, with u_0 free or fixed."""
         ocp = transcribe(self.problem, fix_action=fix_action, ties_active=self.ties_active)
-        return Variant(ocp, self._prepared)
+        return Variant(ocp, self.solver)
 
 
 def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:

@@ -57,11 +57,6 @@ class Ocp:
         return again, (self.problem,)
 
     @property
-    def gamma(self) -> float:
-        """The discount factor."""
-        return self.problem.gamma
-
-    @property
     def tie(self) -> float:
         """A row of stage 0 that exceeds this, in parts of its size, is violated."""
         return -TIE if self.ties_active else TIE

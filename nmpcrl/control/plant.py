@@ -10,7 +10,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.content import Described, TracedFunction
+from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import box, positive_integer
 
@@ -41,9 +41,6 @@ class Plant(Described):
     """A plant that is sampled every `period` seconds.
 
     Where a task has obstacles, the first two states are its position.
-
-    Raises:
-        ValueError: a field makes no sense, or the dynamics are no expression of their arguments.
     """
 
     dynamics: Dynamics  # d state / dt as a CasADi expression of (state, action)
@@ -67,7 +64,7 @@ class Plant(Described):
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields, with the dynamics as an expression: a function need not have a name."""
-        return super().__getstate__() | {"dynamics": TracedFunction(self._derivative)}
+        return super().__getstate__() | {"dynamics": self._derivative}
 
     @property
     def n(self) -> int:
@@ -93,9 +90,9 @@ class Plant(Described):
     @cached_property
     def transition(self) -> ca.Function:
         """The discrete dynamics f(state, action) of Eq. (18), as a CasADi function."""
-        given = (*self._symbols.values(),)
-        later = rk4(self._derivative, *given, self.period, self.substeps)
-        return ca.Function("f", given, [later], [*self._symbols], ["later"])
+        state, action = self._symbols.values()
+        later = rk4(self._derivative, state, action, self.period, self.substeps)
+        return ca.Function("f", [state, action], [later], ["state", "action"], ["later"])
 
     def step(self, state: Vector, action: Vector) -> Vector:
         """The state one period later, shape (n,): Eq. (18)."""

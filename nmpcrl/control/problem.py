@@ -141,9 +141,6 @@ class Problem(Described):
             scale: typical sizes of the states, a number or one a state: it is solved in these
                 units. Absent, they are 1, or what the costs say where that is below 0.01 or
                 above 10,000.
-
-        Raises:
-            ValueError: something is no such thing; the message names it and says what to write.
         """
         self.states = positive_integer("states", states)
         self.inputs = positive_integer("inputs", inputs)
@@ -345,11 +342,7 @@ class Problem(Described):
         return self.names.filled(self.theta, values)
 
     def stage_data(self, values: Mapping[str, Any] | None) -> Matrix:
-        """d_0, ..., d_N, shape (N + 1, size): those given, the others as in the problem.
-
-        Raises:
-            ValueError: a name is unknown, or a shape neither that of a stage nor of all.
-        """
+        """d_0, ..., d_N, shape (N + 1, size): those given, the others as in the problem."""
         return self._known if values is None else self.data_names.filled(self.data, values)
 
     @cached_property

@@ -150,11 +150,7 @@ def short(vector: Vector) -> str:
 
 
 def check_shape(warm_start: Solution, ocp: Ocp) -> None:
-    """Refuse a warm start from a problem with another horizon, plant or number of obstacles.
-
-    Raises:
-        ValueError: it is one.
-    """
+    """Refuse a warm start from a problem with another horizon, plant or number of obstacles."""
     old = warm_start.ocp
     if old.states.shape != ocp.states.shape or old.slacks.shape != ocp.slacks.shape:
         raise ValueError(

@@ -65,9 +65,6 @@ class Task(Described):
 
     A heading is not wrapped: 3.1 and -3.1 rad count as 6.2 rad apart. Give start and target
     headings less than half a turn apart; a `Problem` can weigh 2 (1 - cos(e)) in place of e^2.
-
-    Raises:
-        ValueError: a field makes no sense; the message has its value.
     """
 
     start: Vector  # s_0, shape (n,)
@@ -112,7 +109,9 @@ class Task(Described):
 
         One compilation serves all targets, boxes, layouts and horizons of a plant.
         """
-        soft, hard, data = [], {}, {"target": self.target}
+        soft: list[Soft] = []
+        hard: dict[str, Any] = {}
+        data = {"target": self.target}
         sides = [
             (k, sign, float(limit[k]))
             for sign, limit in ((-1, self.lower), (1, self.upper))

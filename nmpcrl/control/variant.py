@@ -12,7 +12,7 @@ from nmpcrl.control.diagnosis import Diagnosis
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError
-from nmpcrl.control.solvers import Prepared
+from nmpcrl.control.solvers import Solver
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.units import Units
 
@@ -20,9 +20,9 @@ from nmpcrl.control.units import Units
 class Variant:
     """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
 
-    def __init__(self, ocp: Ocp, prepared: Callable[[Ocp], Prepared]) -> None:
+    def __init__(self, ocp: Ocp, solver: Solver) -> None:
         self.ocp, self.units = ocp, Units(ocp)
-        self.solver = prepared(self.units.ocp)
+        self.solver = solver.prepare(self.units.ocp)
         self.solve = self.solver.solve if self.units.own else self._solve_in_units
 
     @property
@@ -85,11 +85,7 @@ class Variant:
         return derivative(self.solver, self.units.inside(solution), *along)
 
     def _dense(self, derivative: Callable[..., Matrix], solution: Solution) -> Matrix:
-        """A derivative of `Sensitivity` at a solution.
-
-        Raises:
-            DerivativeError: there is none.
-        """
+        """A derivative of `Sensitivity` at a solution; DerivativeError where there is none."""
         try:
             return derivative(*_point(self.units.inside(solution)))
         except np.linalg.LinAlgError as error:

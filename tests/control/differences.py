@@ -13,7 +13,7 @@ def active(solution: Solution) -> tuple[bool, ...] | None:
     """Which rows and bounds hold as equalities; None where a multiplier leaves that in doubt."""
     m, ocp, lam = solution.multipliers, solution.ocp, solution.constraint_duals
     size = max(1.0, np.abs(m.dynamics).max())
-    prices = np.outer(ocp.gamma ** np.arange(len(ocp.states)), ocp.slack_weights)
+    prices = np.outer(ocp.problem.gamma ** np.arange(len(ocp.states)), ocp.slack_weights)
     shares = m.obstacles / prices
     bounds = [np.abs(part) / size for part in (m.inputs, m.states[1:], lam[ocp.hard])]
     found = np.concatenate([np.ravel(part) for part in (shares, 1 - shares, *bounds)])

@@ -273,7 +273,7 @@ class Program:
         check_shape(warm_start, ocp)
         z, nu = np.zeros(ocp.lower.size), np.zeros(ocp.lower.size)
         lam = np.zeros(ocp.equality.size)
-        scale = 1.0 if same else 1.0 / ocp.gamma
+        scale = 1.0 if same else 1.0 / ocp.problem.gamma
         for part in ("states", "inputs", "slacks"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
             z[here], nu[here] = warm_start.primal[there], scale * warm_start.bound_duals[there]

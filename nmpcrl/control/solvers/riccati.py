@@ -1,6 +1,7 @@
 """The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen import jit
 from nmpcrl.control.codegen.jit import load
+from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Program
-from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, Prepared, Solver
 from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
 
@@ -110,13 +112,13 @@ class Riccati(Solver):
         """Whether numba is installed."""
         return jit.numba_version() is not None
 
-    def prepare(self, ocp: Ocp) -> "Compiled":
-        """Load the machine code, or compile it.
-
-        Raises:
-            CannotCompile: numba is missing, or the problem holds an operation that is not known.
-        """
-        return Compiled(ocp, self.code(ocp.problem), self)
+    def prepare(self, ocp: Ocp) -> Prepared:
+        """The compiled solver; fatrop, and a warning, where there can be none."""
+        try:
+            return Compiled(ocp, self.code(ocp.problem), self)
+        except CannotCompile as error:
+            warnings.warn(f"{error}: fatrop solves instead of riccati", stacklevel=2)
+            return Fatrop(self.tolerance).prepare(ocp)
 
 
 DEFAULT = Riccati()
@@ -153,7 +155,7 @@ class Compiled:
             np.minimum(problem.upper, UNBOUNDED),
             np.reshape(np.array(sides, float), (-1, 3)),
             np.hstack([kind, np.repeat(np.minimum(stages, 1), len(sides), axis=1)]),
-            ocp.gamma ** np.arange(problem.horizon + 1, dtype=float),
+            ocp.problem.gamma ** np.arange(problem.horizon + 1, dtype=float),
             problem.weights.copy(),
             ocp.tie,
         )

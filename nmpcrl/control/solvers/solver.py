@@ -50,8 +50,4 @@ class Solver(ABC):
 
     @abstractmethod
     def prepare(self, ocp: Ocp) -> Prepared:
-        """Get ready for a problem.
-
-        Raises:
-            CannotCompile: it takes machine code, and there is none for the plant.
-        """
+        """Get ready for a problem."""

@@ -22,9 +22,6 @@ def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
     Args:
         nmpc: the problem.
         longest: the longest horizon that is asked for.
-
-    Raises:
-        CannotCompile: as `Riccati.prepare`.
     """
     task = replace(nmpc.task, obstacles=(Obstacle(0.0, 0.0),))
     longer = task.problem(nmpc.plant, longest, nmpc.gamma, nmpc.slack_weight)
