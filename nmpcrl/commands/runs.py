@@ -65,11 +65,7 @@ def begins(path: Path, name: str) -> bool:
 
 
 def stored_run(name: str) -> Path:
-    """The file of a stored run: a path, a name, or the beginning of one run's name alone.
-
-    Raises:
-        click.ClickException: there are none or several such runs.
-    """
+    """The file of a stored run, by its path, its name, or the beginning of no other run's name."""
     from nmpcrl.study.files import folder
 
     if name.endswith(".npz") and Path(name).is_file():

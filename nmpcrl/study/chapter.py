@@ -21,8 +21,8 @@ MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
 def check(**declared: Any) -> None:
     """Refuse a value that is not allowed, and a name that the chapter does not declare.
 
-    The second cell calls `check(seeds=seeds, layout=layout)`. Values of other names than those of
-    fields of `Experiment`, and their plurals, are checked where they are used.
+    The second cell calls `check(seeds=seeds, layout=layout)`. Fields of `Experiment` and their
+    plurals are checked here, other parameters where they are used.
     """
     for name in sorted(_injected() - set(declared)):
         close = get_close_matches(name, declared, n=1)

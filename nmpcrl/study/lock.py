@@ -66,10 +66,7 @@ def locks() -> tuple[str, ...]:
 
 
 def is_accepted(made: str | None) -> bool:
-    """Whether sources with this hash are the present ones, or those of a lock of these epochs.
-
-    Runs that were never stored name none.
-    """
+    """Whether this is the hash of present or locked sources, or None, as of a run in memory."""
     return made in (None, sources_hash()) or made in locks()
 
 

@@ -26,10 +26,10 @@ def machine() -> dict[str, Any]:
 
 
 def fingerprint() -> dict[str, Any]:
-    """What must be equal, like code and versions, for the same bits as on this machine.
+    """The properties of this machine on which the last bits of numbers depend.
 
     Beside `machine`: the library of C, for its sines; a hash of the processor's instruction sets,
-    for which code is compiled; and those of `SETTINGS` that are set, if any.
+    for which code is compiled; and the `SETTINGS` that are set, if any.
     """
     lines = ("flags", "Features", "cpu family", "model\t")
     found = sorted({line for line in _cpuinfo() if line.startswith(lines)})

@@ -1,7 +1,6 @@
 """Keys of stored runs: hashes of fields, versions of libraries and epochs.
 
-A new field, layout or metric changes no key, nor does a file that is moved or renamed. Code has no
-part in a key: `lock` notices its changes.
+A new field, layout or metric changes no key, nor does code, whose changes `lock` notices.
 """
 
 import hashlib
@@ -90,7 +89,7 @@ def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:
 
 
 def environment() -> dict[str, str]:
-    """The versions that must be equal for the same bits, like key and machine."""
+    """The versions on which the last bits of numbers depend."""
     libraries = {name: installed(name) for name in (*LIBRARIES, "torch")}
     return {"python": platform.python_version(), **libraries}
 

@@ -94,7 +94,7 @@ def is_current(
 
 
 def without(batches: Iterable[Batch], parts: Collection[str]) -> list[dict[str, Any]]:
-    """The batches without these parts; a batch of which nothing is left is dropped."""
+    """The batches without these parts; a batch that counts no other part is dropped."""
     kept = []
     for batch in batches:
         left = {part: n for part, n in counts(batch).items() if part not in parts}
@@ -170,17 +170,16 @@ def _manifest(place: Path) -> dict[str, Any]:
 
 def _content(place: Path, name: str, suffix: str) -> bytes:
     """The bytes of a published file, if they are those that were written."""
-    if not (place / MANIFEST).exists():
-        write = "`nmpcrl investigate FILE.py --publish` writes it"
-        raise Damaged(f"nothing is published in {place}; {_restore(place, write)}")
     path = place / f"{name}{suffix}"
     known = _manifest(place).get(name, {}).get("files", {})
+    if path.name not in known:
+        write = "`nmpcrl investigate FILE.py --publish` writes it"
+        raise Damaged(f"nothing is published in {place} as {path.name}; {_restore(place, write)}")
     try:
         content = path.read_bytes()
     except OSError as error:
-        why = "nothing is published under this name" if path.name not in known else error.strerror
-        raise Damaged(f"{path} cannot be read ({why}); {_restore(place)}") from error
-    if sha256(content).hexdigest() != known.get(path.name):
+        raise Damaged(f"{path} cannot be read ({error.strerror}); {_restore(place)}") from error
+    if sha256(content).hexdigest() != known[path.name]:
         raise Damaged(f"{path} is not the file that was published; {_restore(place)}")
     return content
 

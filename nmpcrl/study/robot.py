@@ -96,7 +96,7 @@ class NmpcPolicy:
         self._plan: Solution | None = None
 
     def __call__(self, observation: Vector) -> Vector:
-        """The first input of the plan; SolverError where there is none."""
+        """The first input of the plan; SolverError if no plan is found."""
         state, rest = observation[:3], observation[3:].reshape(-1, 2).tolist()
         centres = tuple((x, y) for x, y in rest)
         if centres != self._centres:

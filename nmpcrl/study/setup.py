@@ -89,7 +89,7 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
 
 
 def prepare(experiment: Experiment, controller: Nmpc) -> tuple[Learner, Weights, Exploration]:
-    """The learner, its first weights and its noise: all that `train` needs besides `controller`."""
+    """The learner, its first weights and its noise, which `train` takes beside `controller`."""
     children = np.random.SeedSequence(experiment.seed).spawn(3)
     generators = Generators(*map(np.random.default_rng, children))
     explore = Exploration.draw(

@@ -63,7 +63,7 @@ class Store(Generic[Value]):
         return folder() / place / f"{name}-{self.key(named)[:10]}.npz"
 
     def read(self, named: Named, *, report: bool = False) -> Value | None:
-        """The stored value; None if no file has it. `report` says why a file is of no use."""
+        """The stored value, or None; `report` prints why a file that exists cannot be used."""
         lock.warn_of_changes()
         path = self.path_of(named)
         try:

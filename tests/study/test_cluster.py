@@ -51,15 +51,9 @@ def dask(tmp_path) -> Iterator[Callable[[int, str], str]]:
     def start(workers: int, text: str = "") -> str:
         preload = tmp_path / "preload.py"
         preload.write_text(text)
-        started.append(
-            distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                dashboard_address=None,
-                preload=str(preload),
-                env={"NMPCRL_RUNS": str(tmp_path / "elsewhere")},
-            )
-        )
+        how = {"threads_per_worker": 1, "dashboard_address": None, "preload": str(preload)}
+        elsewhere = {"NMPCRL_RUNS": str(tmp_path / "elsewhere")}
+        started.append(distributed.LocalCluster(n_workers=workers, env=elsewhere, **how))
         return started[-1].scheduler_address
 
     yield start
@@ -96,19 +90,20 @@ def test_a_killed_worker_loses_no_run_and_no_bit(dask, tmp_path):
     assert not [*(tmp_path / "elsewhere").rglob("*.npz")]
 
 
+@pytest.mark.slow
+def test_a_run_of_a_worker_with_other_versions_is_not_stored(dask):
+    said = "the worker made another run, or one of other versions"
+    with (
+        cluster.executor(dask(1, OTHER_VERSIONS), 240.0) as executor,
+        pytest.raises(StoreError, match=said),
+    ):
+        fetch_summaries(SIX[:1], executor=executor, progress=False)
+    assert not SUMMARIES.is_stored(SIX[0])
+
+
 def refused(address: str, patience: float, sentence: str) -> None:
     with pytest.raises(Refusal, match=sentence), cluster.executor(address, patience):
         pass
-
-
-@pytest.mark.slow
-def test_a_run_of_a_worker_with_other_versions_is_not_stored(dask):
-    refused = pytest.raises(
-        StoreError, match="the worker made another run, or one of other versions"
-    )
-    with cluster.executor(dask(1, OTHER_VERSIONS), 240.0) as executor, refused:
-        fetch_summaries(SIX[:1], executor=executor, progress=False)
-    assert not SUMMARIES.is_stored(SIX[0])
 
 
 @pytest.mark.slow

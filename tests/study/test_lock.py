@@ -116,13 +116,6 @@ def test_the_code_is_what_the_lock_has():
     assert lock.locked()["epochs"] == provenance.EPOCHS
 
 
-@pytest.mark.parametrize("begins", ["07237effb4b1545a", "44134a116cb64ab0"])
-def test_no_run_of_the_first_edition_is_taken_for_one_of_this(begins):
-    """By the last two source hashes of that edition; of its epochs, all four were 1."""
-    assert not any(one.startswith(begins) for one in lock.locks())
-    assert provenance.EPOCHS["control"] > 1 < provenance.EPOCHS["learning"]
-
-
 def test_a_warning_names_the_changed_files_once(monkeypatch, capsys):
     then = {**sources(), "learning/updates.py": "another"}
     monkeypatch.setattr(lock, "locked", lambda: {"sources": then})
