@@ -19,6 +19,7 @@ class LinearController:
     gamma: float = 0.9
     calls: list = field(default_factory=list)  # (state, theta, warm_start, action) of every solve
     products: list = field(default_factory=list)  # (solution, vector) of every Hessian product
+    curvature = 0.0  # of V in s'theta
 
     def solve(self, state, theta, warm_start=None, action=None):
         self.calls.append((state, theta, warm_start, action))
@@ -34,10 +35,7 @@ class LinearController:
 
     def value_hessian_times(self, solution, vector):
         self.products.append((solution, vector))
-        return self.value_hessian(solution) @ vector
-
-    def value_hessian(self, solution):
-        return np.zeros((3, 3))
+        return self.curvature * solution.state * (solution.state @ vector)
 
     def value(self, state, theta):
         return float(state @ theta)
@@ -49,14 +47,13 @@ class LinearController:
 class QuadraticController(LinearController):
     """V_theta(s) = (s' theta)^2: the simplest value that is curved in theta."""
 
+    curvature = 2.0
+
     def value(self, state, theta):
         return float(state @ theta) ** 2
 
     def features(self, state, theta):
         return 2 * (state @ theta) * state
-
-    def value_hessian(self, solution):
-        return 2 * np.outer(solution.state, solution.state)
 
 
 @dataclass

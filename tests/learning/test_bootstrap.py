@@ -95,15 +95,6 @@ def taught():
     return QNetwork(5, np.random.default_rng(0), batch=1)
 
 
-def test_a_late_network_predicts_what_it_did_after_the_step_before(transition):
-    """The same examples and fits; each value is that of the weights one fit earlier."""
-    late, prompt = (
-        values(Imitation(taught(), with_theta=False, late=late), transition(THETA), 6)
-        for late in (True, False)
-    )
-    assert late == [None, *prompt[:-1]]
-
-
 def test_a_lagged_copy_predicts_and_is_refreshed_after_so_many_steps(transition):
     network, found, present = taught(), [], []
     lagged = Imitation(network, with_theta=False, target=Target(network, every=3))

@@ -137,13 +137,6 @@ def test_a_plant_that_runs_away_is_a_failed_solve(tank, later, end, ran):
             run(learner, tank, noise(10, 3, 1), **how)
 
 
-def test_a_plant_of_a_task_may_run_away_as_well(robot):
-    fast = Plant(lambda s, a: s * (s + 3), ("x", "y", "psi"), ("v", "w"), robot.lower, robot.upper)
-    rollout = evaluate(robot, THETA, 9, plant=fast)
-    assert "ran away" in rollout.failure
-    assert 0 < len(rollout.states) == len(rollout.costs) < 9
-
-
 @pytest.mark.parametrize("broken", ["plant", "start", "data"])
 def test_an_error_inside_a_function_of_the_user_is_that_error(tank, broken):
     def fails(*given):

@@ -70,11 +70,9 @@ def test_a_step_by_hand(controller, network, transition, weights, name):
     assert update.delta == pytest.approx(delta)
     given = weights.theta, weights.w, step.solution.features
     np.testing.assert_array_equal(given, [THETA, W, PHI])
-    again, expected = (
-        pickle.loads(pickle.dumps(update.weights)),
-        moved(learner, update.weights, step),
-    )
-    for one in (copy.deepcopy(update.weights), again, Weights(again.theta, again.w)):
+    after, expected = update.weights, moved(learner, update.weights, step)
+    again = pickle.loads(pickle.dumps(after))
+    for one in (copy.deepcopy(after), again, Weights(after.theta, after.w)):
         np.testing.assert_array_equal(moved(learner, one, step), expected)
 
 

@@ -116,16 +116,16 @@ def test_what_cannot_be_trained_is_refused_at_the_call(robot, refused, message):
         refused(robot)
 
 
-def test_weights_may_be_lists_and_are_left_as_they_are(robot):
+@pytest.mark.parametrize("theta", [THETA.copy(), THETA.tolist()])
+def test_weights_may_be_lists_and_are_left_as_they_are(robot, theta):
     def in_place(theta, memory, *_):
         theta[:] += 1.0
         return theta, memory
 
-    given = Weights(THETA.tolist(), [0.0] * 9)
     learner = replace(es(robot), rule=UpdateRule(in_place))
-    *_, last = train(learner, robot, given, noise(1, 3))
+    *_, last = train(learner, robot, Weights(theta, [0.0] * 9), noise(1, 3))
     np.testing.assert_array_equal(last.weights.theta, THETA + 3)
-    assert given.theta == THETA.tolist()
+    np.testing.assert_array_equal(theta, THETA)
 
 
 def test_a_solve_in_the_state_itself_is_the_next_warm_start_and_else_the_plan_before():
