@@ -59,7 +59,7 @@ MAKE = {
 }
 READINGS = [name for name in NETWORKS if name not in ("plain", "greedy")]
 OPTIONS = [{}, {"constrained": True}, {"constrained": False, "clipped": False}]
-SOLVED, LIMIT, COLD = int(End.SOLVED), float(End.LIMIT), int(Start.COLD)
+LIMIT, COLD = float(End.LIMIT), int(Start.COLD)
 
 
 def noise(count=count_steps, steps=STEPS):
@@ -72,15 +72,15 @@ def weights():
 
 def rows_and_ends(made, rows_of):
     """A row a step, whether and why an episode failed, and why learning stopped."""
-    rows, failures = [np.empty((0, len(NUMBERS) + 32))], []
+    rows, failures, stopped = [], [], ""
     try:
         for part in made:
             rows.append(rows_of(part))
             if getattr(part, "last", True):
                 failures.append(part.failure)
     except Diverged as error:
-        return np.vstack(rows), failures, str(error)
-    return np.vstack(rows), failures, ""
+        stopped = str(error)
+    return np.vstack(rows), failures, stopped
 
 
 def assert_same(make, nmpc, explore=None, looped=True, **options):
