@@ -99,14 +99,8 @@ def call(robot, **options):
         (lambda _: Exploration(np.zeros((2, 5)), np.ones((2, 5))), r"\(2, 5\) .*\(episodes, steps"),
         (lambda _: Exploration(np.zeros((2, 5, 2)), np.ones(2)), r"scale \(2,\): .*\(episodes"),
         (lambda _: Exploration(np.zeros((2, 5, 2)), np.ones((2, 4))), r"scale \(2, 4\): .*\(epis"),
-        (
-            lambda nmpc: call(nmpc, explore=noise(1, 3, 1)),
-            "1 numbers a step; the NMPC has 2 inputs",
-        ),
-        (
-            lambda nmpc: call(nmpc, weights=THETA),
-            r"weights = array.* must be Weights: write Weights\(the",
-        ),
+        (lambda nmpc: call(nmpc, explore=noise(1, 3, 1)), "1 numbers a step; the NMPC has 2 i"),
+        (lambda nmpc: call(nmpc, weights=THETA), r"weights = array.* must be Weights: write We"),
         (lambda nmpc: call(nmpc, clipped=False), r"clipped = .* \[0.6    1.5708\].* QL has no Q\("),
         (lambda nmpc: call(nmpc, controller=5), "controller = 5 must be an Nmpc"),
     ],
