@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import wasmtime
 from numba import carray, cfunc, types
-from numpy.typing import NDArray
 from wasmtime import _bindings as c
 
 from nmpcrl import Vector
@@ -83,11 +82,11 @@ class Module:
             why = self("why")
             raise {1: MemoryError, 2: ValueError}.get(why, RuntimeError)(why) from error
 
-    def put(self, numbers: Any) -> int:
+    def put(self, numbers: Any, kind: Any = float) -> int:
         """Reserve room for an array and write it there; its address."""
-        array = np.ravel(np.asarray(numbers, float))
-        address = self("reserve", max(array.nbytes, SIZE))
-        self.write(address, array)
+        array = np.ravel(np.asarray(numbers, kind))
+        address: int = self("reserve", max(array.nbytes, SIZE))
+        self._numbers.view(np.uint8)[address : address + array.nbytes] = array.view(np.uint8)
         return address
 
     def write(self, address: int, numbers: Any) -> None:
@@ -97,14 +96,6 @@ class Module:
     def read(self, address: int, count: int) -> Vector:
         first = address // SIZE
         return self._numbers[first : first + count].copy()
-
-    def put_bytes(self, array: NDArray[Any]) -> tuple[int, NDArray[Any]]:
-        """Reserve room for an array of any type; its address, and the room itself."""
-        address = self("reserve", array.nbytes)
-        room = self._numbers.view(np.uint8)[address : address + array.nbytes]
-        there = room.view(array.dtype).reshape(array.shape)
-        there[...] = array
-        return address, there
 
     @staticmethod
     def _given(store: wasmtime.Store, name: str, kind: wasmtime.FuncType) -> wasmtime.Func:

@@ -137,8 +137,12 @@ def _load(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
         except Exception as error:  # whatever a damaged file makes numba raise
             print(f"{place} is damaged ({error}) and is compiled again", file=sys.stderr)
     shutil.rmtree(place)
+    began = time.perf_counter()
+    if notice:
+        print(notice, end=" ", file=sys.stderr, flush=True)
     try:
-        module = _compiled(place, texts, notice)
+        folder.write(place, texts)
+        module = folder.imported(place)
     except Exception as error:
         shutil.rmtree(place, ignore_errors=True)
         if isinstance(error, OSError | MemoryError) or not _in_numba(error):
@@ -146,22 +150,8 @@ def _load(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
         reason = (str(error).strip() or type(error).__name__).splitlines()[-1]
         raise CannotCompile(f"numba cannot compile {place.name}: {reason}") from error
     complete.touch()
-    return module
-
-
-def _compiled(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
-    """The package, written and imported, which compiles it."""
-    folder.write(place, texts)
-    if not notice:
-        return folder.imported(place)
-    began = time.perf_counter()
-    print(notice, end=" ", file=sys.stderr, flush=True)
-    try:
-        module = folder.imported(place)
-    except BaseException:
-        print("stopped.", file=sys.stderr)
-        raise
-    print(f"done in {time.perf_counter() - began:.0f} s.", file=sys.stderr)
+    if notice:
+        print(f"done in {time.perf_counter() - began:.0f} s.", file=sys.stderr)
     return module
 
 

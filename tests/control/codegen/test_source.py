@@ -1,5 +1,7 @@
 """What numba makes of CasADi's expressions equals CasADi, for every operation and every layout."""
 
+from itertools import product
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,74 +12,40 @@ from nmpcrl.control.codegen.source import BINARY, INNER, UNARY, CannotCompile, s
 from nmpcrl.control.solvers import model
 from nmpcrl.control.solvers.stages import MATRICES, functions, write
 
-SPECIAL = [
-    0.0,
-    1.0,
-    -1.0,
-    0.5,
-    -0.5,
-    2.0,
-    -3.5,
-    7.0,
-    1e-300,
-    1e19,
-    -1e19,
-    1e300,
-    np.inf,
-    -np.inf,
-    np.nan,
-]
-NUMBERS = np.concatenate([SPECIAL, np.random.default_rng(0).normal(scale=3, size=25)])
-NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
-x, y = ca.SX.sym("x"), ca.SX.sym("y")
+SPECIAL = [0.0, 1.0, -1.0, 0.5, -0.5, 2.0, -3.5, 7.0, 1e-300, 1e19, -1e19, 1e300]
+NUMBERS = [*SPECIAL, np.inf, -np.inf, np.nan, *np.random.default_rng(0).normal(scale=3, size=25)]
+x, y, many = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("many", 2)
 
 
-def same(found, exact):
-    np.testing.assert_allclose(found, exact, rtol=2e-15, atol=0)  # nan equals nan
+def same(found, exact, of=""):
+    np.testing.assert_allclose(found, exact, rtol=2e-15, atol=0, err_msg=of)  # nan equals nan
 
 
-@pytest.fixture(scope="module")
-def unary():
-    """All unary operations of one number, by CasADi and by numba."""
-    results = ca.vertcat(*(ca.SX.unary(operation, x) for operation in UNARY))
-    function = ca.Function("unary", [x], [results], ["x"], ["all"])
-    return function, callable_of(function)
+@pytest.mark.parametrize(
+    ("of", "results"),
+    [
+        ([x], [ca.SX.unary(code, x) for code in UNARY]),
+        ([x, y], [ca.SX.binary(code, x, y) for code in BINARY]),
+    ],
+    ids=["unary", "binary"],
+)
+def test_every_operation_is_casadis(of, results):
+    function = ca.Function("operations", of, [ca.vertcat(*results)])
+    code = callable_of(function)
+    for given in product(NUMBERS, repeat=len(of)):
+        same(code(*([number] for number in given)), function(*given).full().ravel(), str(given))
 
 
-@pytest.fixture(scope="module")
-def binary():
-    """All binary operations of two numbers, by CasADi and by numba."""
-    results = ca.vertcat(*(ca.SX.binary(operation, x, y) for operation in BINARY))
-    function = ca.Function("binary", [x, y], [results], ["x", "y"], ["all"])
-    return function, callable_of(function)
-
-
-@pytest.mark.parametrize("index", range(len(UNARY)), ids=[NAMES[k] for k in UNARY])
-def test_an_operation_of_one_number_is_casadis(unary, index):
-    casadi, code = unary
-    for number in NUMBERS:
-        same(code([number])[index], casadi(number).full()[index, 0])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("index", range(len(BINARY)), ids=[NAMES[k] for k in BINARY])
-def test_an_operation_of_two_numbers_is_casadis(binary, index):
-    casadi, code = binary
-    for one in NUMBERS[::2]:
-        for other in NUMBERS:
-            same(code([one], [other])[index], casadi(one, other).full()[index, 0])
-
-
-def test_an_operation_that_is_not_known_is_named():
-    unknown = ca.Function("f", [x], [ca.erfinv(x)], ["x"], ["r"])
-    with pytest.raises(CannotCompile, match="f holds CasADi's OP_ERFINV, which is not known here"):
-        source(unknown)
-
-
-def test_a_function_that_is_no_expression_of_scalars_is_refused():
-    z = ca.MX.sym("z", 2)
-    with pytest.raises(CannotCompile, match="g is not an SX function"):
-        source(ca.Function("g", [z], [2 * z], ["z"], ["r"]))
+@pytest.mark.parametrize(
+    ("function", "reason"),
+    [
+        (ca.Function("f", [x], [ca.erfinv(x)]), "f holds CasADi's OP_ERFINV, which is not known"),
+        (ca.Function("f", [ca.MX.sym("z")], [ca.MX(1)]), "f is not an SX function"),
+    ],
+)
+def test_what_is_not_known_is_named(function, reason):
+    with pytest.raises(CannotCompile, match=reason):
+        source(function)
 
 
 def test_matrices_vectors_scalars_and_zeros_are_laid_out_right():
@@ -100,16 +68,27 @@ def test_matrices_vectors_scalars_and_zeros_are_laid_out_right():
         same(found, exact.full().reshape(found.shape))
 
 
-def test_one_scalar_is_returned():
-    function = ca.Function("product", [x, y], [x * y], ["x", "y"], ["r"])
-    assert compiled(function)(np.array([3.0]), np.array([4.0])) == 12.0
-    assert callable_of(function)([3], [4]) == 12.0
-
-
-def test_the_entries_of_a_sparse_argument_are_found():
+def test_the_entries_of_a_sparse_argument_are_found_and_one_scalar_is_returned():
     lower = ca.SX.sym("z", ca.Sparsity.lower(2))
     function = ca.Function("corner", [lower], [2 * lower[1, 1]], ["z"], ["r"])
     assert compiled(function)(np.array([[1.0, 0.0], [3.0, 4.0]])) == 8.0
+    assert callable_of(ca.Function("product", [x, y], [x * y]))([3], [4]) == 12.0
+
+
+@pytest.mark.parametrize(
+    ("results", "options", "line"),
+    [
+        ({"y": many[0] * many[1]}, {}, "    return w"),
+        ({"y": many[0] * many[1]}, {"returned": False}, "    y_[0] = w"),
+        ({"y": many, "B": many[0]}, {"matrices": ("B",)}, "    B_[0, 0] = w"),
+        ({"y": many}, {"shifted": {"y": "at"}}, "    y_[at + 1] = w"),
+        ({"y": many}, {"added": ("y",)}, "    y_[1] += w"),
+        ({"y": ca.SX(0, 1), "h": ca.SX(0, 1)}, {}, "def f(x, y_, h_):\n    pass\n"),
+    ],
+)
+def test_a_result_is_written_as_it_is_asked(results, options, line):
+    function = ca.Function("f", [many], [*results.values()], ["x"], [*results])
+    assert line in source(function, **options)
 
 
 def test_the_stages_are_the_functions_that_model_promises(problem):
@@ -154,19 +133,3 @@ def test_the_compiled_stages_are_casadis(problem):
         code(*arguments, *out, *begins)
         for found, right in zip(out, exact, strict=True):
             np.testing.assert_allclose(found, right.reshape(found.shape), rtol=1e-13, atol=1e-14)
-
-
-def test_a_single_number_may_be_written_and_a_single_column_be_a_matrix():
-    """A plant with one state has a transition that is no scalar, and one input a Jacobian."""
-    x = ca.SX.sym("x", 2)
-    one = ca.Function("one", [x], [x[0] * x[1]], ["x"], ["y"])
-    assert "y_[0] = w" in source(one, returned=False)
-    assert "return w" in source(one)
-    both = ca.Function("both", [x], [x, x[0]], ["x"], ["y", "B"])
-    assert "B_[0, 0] = w" in source(both, matrices=("B",))
-
-
-def test_a_function_without_results_does_nothing():
-    x = ca.SX.sym("x", 2)
-    empty = ca.Function("empty", [x], [ca.SX(0, 1), ca.SX(0, 1)], ["x"], ["h", "hx"])
-    assert source(empty) == "def empty(x, h_, hx_):\n    pass\n"
