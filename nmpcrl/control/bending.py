@@ -1,4 +1,4 @@
-"""Weights that turn negative while they are learned: whether a cost then bends downwards."""
+"""A warning where a learned weight turns negative, and a cost bends downwards for it."""
 
 import warnings
 
@@ -13,7 +13,7 @@ ROUNDING = 1e-9  # of a curvature, in parts of the largest
 
 
 class Bending:
-    """The curvature of a problem's costs in state and input, as far as theta is part of it."""
+    """The curvature of a problem's costs in state and input, where it depends on theta."""
 
     def __init__(self, problem: Problem) -> None:
         e = problem.expressions
@@ -25,9 +25,10 @@ class Bending:
         self.least = np.where(weighs & (problem.theta > 0), 0.0, -np.inf)
 
     def judge(self, state: Vector, theta: Vector, data: Matrix) -> None:
-        """Warn of entries below `least` where a cost bends downwards and would not with their sign.
+        """Warn if a cost bends downwards for the entries of theta below `least`.
 
-        Those are judged again once they are twice as low, and no more after the warning.
+        With their signs changed it must not bend down as much. An entry without a warning is judged
+        again at twice its value, and never again after a warning.
         """
         of, fell = self._problem, theta < self.least
         self.least = np.where(fell, 2 * theta, self.least)

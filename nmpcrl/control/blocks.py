@@ -76,7 +76,7 @@ class Symbols(dict[str, ca.SX]):
 
 
 def unknown(what: str, name: str, known: Iterable[str]) -> ValueError:
-    """What is said of a name that there is not, with the nearest that there is."""
+    """The error for an unknown name, with the nearest known one."""
     near = difflib.get_close_matches(str(name), known, 1)
     meant = f"; did you mean {near[0]!r}?" if near else ""
     return ValueError(f"{what} has no {name!r}{meant} (it has {', '.join(known) or 'none'})")

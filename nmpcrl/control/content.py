@@ -1,8 +1,7 @@
-"""What a value is made of, as JSON can hold it: whatever changes what it does changes its content.
+"""Contents and keys: a value with another behaviour has another content, in every process.
 
-Of a function that is the code that Python compiled, with all that it closes over and all that it
-reads of its module; a comment or another name changes nothing. What a library brings is named by
-its version.
+The content of a function is its compiled code, its closure and the globals that it reads; comments
+and its name change nothing. Objects of libraries are named, with the library's version.
 """
 
 import dis
@@ -23,15 +22,15 @@ AROUND = (
     property, cached_property, staticmethod, classmethod, type(cache(abs)), partial, MethodType,
 )  # fmt: skip
 WITHIN = ("fget", "fset", "func", "args", "keywords", "__wrapped__", "__self__", "__name__")
-OWN = "nmpcrl"  # whose code the epochs of `provenance` stand for
+OWN = "nmpcrl"  # has epochs, in `provenance`, in place of a version
 
 
 class NoContent(ValueError):
-    """Of this value no name can be made; the message says what it is."""
+    """A value has no content; the message names it."""
 
 
 class Described:
-    """Something that is pickled, copied and named by its fields, without `cached_property` ones."""
+    """An object that is pickled, copied and hashed by its fields, without cached properties."""
 
     def __getstate__(self) -> dict[str, Any]:
         kind = type(self)
@@ -42,7 +41,7 @@ class Described:
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """The fields; an array is as unchangeable as it was made."""
+        """Restore the fields; arrays become read-only again."""
         for value in state.values():
             for one in value if isinstance(value, tuple) else (value,):
                 if isinstance(one, np.ndarray):
@@ -65,7 +64,7 @@ def key_of(*values: Any) -> str:
 
 
 def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
-    """Nested lists and texts, the same for values that do the same.
+    """The content of a value: nested lists and texts, as JSON can hold them.
 
     Raises:
         NoContent: the value holds something that may be different each time, as a generator does.
@@ -92,7 +91,7 @@ def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
 
 
 def _instance(value: Any, inside: tuple[int, ...]) -> Any:
-    """An object by its key, by the specification of Gymnasium, or by its class and its fields."""
+    """The content of an object: its key, Gymnasium's specification, or its class and fields."""
     key: Any = getattr(value, "key", None)
     spec: Any = getattr(value, "spec", None)
     if isinstance(key, str):
@@ -111,7 +110,7 @@ def _instance(value: Any, inside: tuple[int, ...]) -> Any:
 
 
 def _defined(value: Any, inside: tuple[int, ...]) -> Any:
-    """A module, a function or a class."""
+    """The content of a module, a function or a class."""
     module = str(getattr(value, "__module__", None) or getattr(value, "__name__", ""))
     name = getattr(value, "__qualname__", "")
     if isinstance(value, ModuleType | BuiltinFunctionType) or _is_library(module):
@@ -127,14 +126,14 @@ def _defined(value: Any, inside: tuple[int, ...]) -> Any:
 
 
 def _is_written(name: str, value: Any) -> bool:
-    """Whether an attribute of a class was written there, and not made by Python or a decorator."""
+    """Whether an attribute is written in its class, and not made by Python or a decorator."""
     if isinstance(value, FunctionType) and name != "__repr__":
         return not name.startswith("__") or value.__code__.co_filename != "<string>"
     return not name.startswith(("__", "_abc_"))
 
 
 def _code(code: CodeType) -> Any:
-    """What Python compiled, without where it stands."""
+    """Compiled code without its file and lines."""
     constants = [
         _code(one) if isinstance(one, CodeType) else content(one) for one in code.co_consts
     ]
@@ -142,7 +141,7 @@ def _code(code: CodeType) -> Any:
 
 
 def _reads(code: CodeType) -> Iterator[str]:
-    """The names of a function's module that it reads, inner functions included."""
+    """The globals that code and its inner functions read."""
     for step in dis.get_instructions(code):
         if step.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
             yield step.argval
@@ -153,7 +152,7 @@ def _reads(code: CodeType) -> Iterator[str]:
 
 @cache
 def _is_library(module: str) -> bool:
-    """Whether a module is Python's, an installed one or ours, and not the user's."""
+    """Whether a module belongs to Python, to an installed library or to this one."""
     root = module.partition(".")[0]
     if root == "__main__":
         return False

@@ -47,7 +47,6 @@ class StageDerivatives:
 
         Shapes (n, n + m), (n + m,) and (n + m, n + m).
         """
-        data = self._problem.data if solution.data is None else solution.data
-        given = (solution.state, action, solution.theta, self._problem.own(data[0]))
+        given = solution.state, action, solution.theta, self._problem.own(solution.data[0])
         model, slope, curvature = (np.array(one.full()) for one in self._function(*given))
         return model, slope[0], curvature

@@ -1,4 +1,4 @@
-"""Why a solve can have failed: what is not finite, or grows too fast, where a plan begins."""
+"""Why a solve may have failed: numbers that are not finite, a fast model, a kink."""
 
 import casadi as ca
 import numpy as np
@@ -8,8 +8,8 @@ from nmpcrl.control.expression import place
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import short
 
-FASTEST = 10.0  # what one step of a model may multiply a small deviation by
-FARTHEST = 1e9  # no plan goes through such a state
+FASTEST = 10.0  # factor of a small deviation in one step
+FARTHEST = 1e9  # largest number in a state of a plan
 UNSTABLE = "an unstable model takes a shorter horizon"
 SUBSTEPS = f"dynamics too fast for their period take more substeps, of rk4 or the plant; {UNSTABLE}"
 ORDERS = {  # what is not finite -> what to write instead
@@ -29,7 +29,7 @@ ROUND = (
 
 
 class Diagnosis:
-    """The functions of an OCP and their derivatives, looked at without planning anything."""
+    """The functions of an OCP and their derivatives along a rollout at rest."""
 
     def __init__(self, ocp: Ocp) -> None:
         of, e = ocp.problem, ocp.problem.expressions
@@ -49,7 +49,7 @@ class Diagnosis:
             self._functions[name] = ca.Function(name, given, orders)
 
     def why(self, state: Vector, theta: Vector, data: Matrix) -> str:
-        """What is wrong on the way that no input leads to, in one sentence; "" if nothing is."""
+        """The first fault of a rollout at rest, or a kink, in one sentence; "" if there is none."""
         for i in range(self._problem.horizon):
             at = state, self._problem.still
             values = {
@@ -66,7 +66,7 @@ class Diagnosis:
         return ""
 
     def _not_finite(self, values: dict[str, list[Matrix]]) -> str:
-        """Which function or derivative is not finite, with a place for where."""
+        """The function or derivative that is not finite, with {} for the point."""
         for order, (of, advice) in enumerate(ORDERS.items()):
             for name, orders in values.items():
                 found = orders[order]
@@ -76,7 +76,7 @@ class Diagnosis:
         return ""
 
     def _too_fast(self, steps: int, value: Matrix, slope: Matrix, _: Matrix) -> str:
-        """How fast the model is, or how far it has led."""
+        """How fast the model is, or how far it leads."""
         growth = np.abs(np.linalg.eigvals(slope[:, : self._problem.states])).max()
         if growth > FASTEST:
             does = f"makes {growth:.1g} times as much of a small deviation in one step"
@@ -88,7 +88,7 @@ class Diagnosis:
 
 
 def kinks_in(written: ca.SX, moved: ca.SX) -> list[str]:
-    """What CasADi calls the operations with a kink whose arguments a plan moves."""
+    """The names of operations with a kink whose arguments depend on `moved`."""
     others = [one for one in ca.symvar(written) if not ca.depends_on(moved, one)]
     function = ca.Function("written", [moved, ca.vertcat(*others)], [written])
     moving: set[int] = set()  # places that the plan moves, each written to several times

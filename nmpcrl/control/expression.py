@@ -1,4 +1,4 @@
-"""What a function of the user writes down in symbols, looked through before anything is solved."""
+"""Functions of a user evaluated in symbols, and refused where no solver can use them."""
 
 import inspect
 import warnings
@@ -55,7 +55,7 @@ def expression(
 
 
 def mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
-    """Why a function cannot be called with these; "" if it can, or does not say what it takes."""
+    """Why a function cannot be called with these arguments; "" if it can, or is not known to."""
     try:
         inspect.signature(function).bind(*arguments)
     except ValueError:
@@ -66,12 +66,12 @@ def mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
 
 
 def place(name: str, row: int, size: int) -> str:
-    """What an entry of an expression is called: "model[1]", or "stage" where there is one."""
+    """The name of an entry of an expression: "model[1]", or "stage" for the only one."""
     return f"{name}[{row}]" if size > 1 else name
 
 
 def _column(result: Any) -> ca.SX | None:
-    """A result as a column; None if it is none."""
+    """A result as a column; None for anything else."""
     if isinstance(result, ca.MX):
         return None
     if isinstance(result, list | tuple | np.ndarray):

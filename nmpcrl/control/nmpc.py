@@ -51,11 +51,11 @@ class Nmpc(Described):
         *,
         ties_active: bool = False,
     ) -> None:
-        """Check and keep the problem; it is transcribed at the first solve.
+        """Check the problem; it is transcribed at the first solve.
 
         Args:
-            plant: predicts; the robot of Eq. (18) in the paper. Or a `Problem`, which has a task,
-                horizon, gamma and weights of its own.
+            plant: the model of the prediction, the robot of Eq. (18) in the paper; or a `Problem`,
+                without the next four.
             task: target, box and obstacles.
             horizon: N, the number of planned inputs.
             gamma: discount factor, 0 < gamma <= 1.
@@ -177,7 +177,7 @@ class Nmpc(Described):
 
     @property
     def key(self) -> str:
-        """As of a `Problem`. Without numba, riccati's is that of fatrop, which then solves."""
+        """As in `Problem`; without numba, riccati has the key of fatrop, which then solves."""
         solver = self.solver if self.solver.available else Fatrop(self.solver.tolerance)
         return key_of(type(self), self.__getstate__() | {"solver": solver})
 
@@ -186,7 +186,7 @@ class Nmpc(Described):
         return np.minimum(np.maximum(action, self.lower), self.upper)
 
     def machine(self, *, fix_action: bool) -> Compiled | None:
-        """The compiled solver for V(s) or Q(s, a); None where none solves, or in its own units."""
+        """The compiled solver for V(s) or Q(s, a); None as in `Variant.machine`."""
         return (self._fixed if fix_action else self._free).machine
 
     @property
@@ -199,7 +199,6 @@ class Nmpc(Described):
 
     @cached_property
     def _bending(self) -> Bending:
-        """Of a problem's costs."""
         return Bending(self.problem)
 
     @cached_property
@@ -217,7 +216,7 @@ class Nmpc(Described):
 
 
 def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:
-    """A copy of `vector`, once its shape and its numbers are known to be right."""
+    """A copy of a vector of this size with no number larger."""
     try:
         vector = np.array(vector, dtype=float)
     except (TypeError, ValueError):

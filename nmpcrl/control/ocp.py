@@ -51,19 +51,19 @@ class Ocp:
     hard: Indices  # hard rows in g, shape (N + 1, H)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled as what it is transcribed from."""
+        """Pickle the problem, to be transcribed again."""
         again = partial(transcribe, fix_action=self.fixed_action.size > 0,
                         ties_active=self.ties_active)  # fmt: skip
         return again, (self.problem,)
 
     @property
     def tie(self) -> float:
-        """A row of stage 0 that exceeds this, in parts of its size, is violated."""
+        """The excess, in parts of a row's size, from which a row of stage 0 is violated."""
         return -TIE if self.ties_active else TIE
 
     @cached_property
     def sizes(self) -> tuple[Vector, Vector]:
-        """The units of z and g; those of slacks and rows are `Problem.typical_row_sizes`."""
+        """The units of z and g: `Problem.typical_row_sizes` for slacks and rows, else 1."""
         z, g = np.ones(self.lower.size), np.ones(self.equality.size)
         soft, sizes = self.problem.soft, self.problem.typical_row_sizes
         z[self.slacks] = g[self.obstacles] = sizes[soft]
@@ -82,7 +82,7 @@ class Ocp:
         return self.problem.weights[self.problem.soft]
 
     def settled(self, p: Vector) -> tuple[Any, Vector, Any]:
-        """The soft rows of stage 0 that no plan can change: which of the M, h, and their ties."""
+        """The soft rows of stage 0 that no plan can change: their indices, h and ties."""
         soft = self.problem.soft
         (which,) = np.nonzero(self.settled_rows[soft])
         rows, sizes = (one.full().ravel()[soft][which] for one in self._start_rows(p))
@@ -90,7 +90,7 @@ class Ocp:
 
     @property
     def settled_rows(self) -> NDArray[np.bool_]:
-        """Which rows of stage 0 no plan can change."""
+        """Whether no plan can change a row of stage 0."""
         fixed = self.fixed_action.size > 0
         return np.full(self.problem.weights.size, True) if fixed else ~self.problem.on_inputs
 
@@ -108,12 +108,12 @@ class Ocp:
 def transcribe(problem: Problem, *, fix_action: bool, ties_active: bool = False) -> Ocp:
     """Write a problem by multiple shooting; with `fix_action`, add u_0 = a as a constraint.
 
-    Bounds of states and hard rows count for what a plan can change: x_0 is given, and noise may
+    Bounds of states and hard rows hold where a plan can change them: x_0 is given, and noise may
     have pushed it out.  # departure M
-    What concerns stage 0 alone is written in s rather than in x_0, its equal, and in a where it is
-    given, so that the multipliers of slacks that no plan can change stay out of the others. A row
+    Rows and costs of stage 0 alone are written in s rather than in x_0, its equal, and in a where
+    it is given, so that multipliers of slacks that no plan can change stay out of the others. A row
     that does not hold at a stage is -1 <= sigma there.
-    A fixed u_0 has no bounds of its own, or one at a bound would leave no interior.
+    A fixed u_0 has no bounds, or one at a bound would leave no interior.
     """
     e, N, soft = problem.expressions, problem.horizon, problem.soft
     x = [ca.SX.sym(f"x_{i}", problem.states) for i in range(N + 1)]
@@ -184,7 +184,7 @@ def transcribe(problem: Problem, *, fix_action: bool, ties_active: bool = False)
 
 
 def _stacked(parts: list[tuple[str, ca.SX]]) -> tuple[ca.SX, dict[str, Indices]]:
-    """Expressions on top of each other, and the places of those of a kind, a row each."""
+    """Expressions on top of each other, and their places by kind, a row an expression."""
     where: dict[str, list[Indices]] = {}
     size = 0
     for kind, part in parts:

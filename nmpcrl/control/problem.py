@@ -1,11 +1,11 @@
-"""Optimal control in which any symbol can be learned: `Problem`, given to `Nmpc`.
+"""Optimal control in which any symbol can be learned: a `Problem` is given to `Nmpc`.
 
     min   V0(s, theta) + sum_i gamma^i l(x_i, u_i, theta, d_i) + gamma^N V_f(x_N, theta, d_N)
           + sum_i gamma^i W' sigma_i
     s.t.  x_0 = s,  x_{i+1} = f(x_i, u_i, theta, d_i),  lower <= u_i <= upper,
           h(x_i, u_i, theta, d_i) <= sigma_i,  sigma_i >= 0,  g(x_i, u_i, theta, d_i) <= 0
 
-f, l, V_f, V0, h and g are written once, in CasADi's SX; all their derivatives follow from that.
+f, l, V_f, V0, h and g are functions that return CasADi's SX, which is differentiated.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,13 +24,13 @@ from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import box, positive_integer, read_only, spread
 
-SMALL, LARGE = 1e-2, 1e4  # sizes of states that every solver takes as they are
-LEAST = 1e-200  # curvature, or slope
+SMALL, LARGE = 1e-2, 1e4  # sizes of states and rows between which solvers need no scaling
+LEAST = 1e-200  # curvature or slope that counts
 
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """Numbers that are learned: where they start and, for learners that project, their bounds.
+    """The start of learned numbers, and their bounds for learners that project.
 
     A weight of a cost, which must not turn negative, is Parameter(start, lower=0).
     """
@@ -42,32 +42,32 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Soft:
-    """Rows h <= sigma, sigma >= 0, whose slacks cost `weight` each, discounted."""
+    """Rows h <= sigma, sigma >= 0, with a discounted cost of `weight` for a unit of each slack."""
 
     row: Callable[..., Any]  # (x, u, th) -> h, a number or a column; with d where there are data
     weight: Any = 1.0  # W > 0, a number, or one a row
     stages: Any = None  # among 0, ..., N: an index, a slice or a list; all possible ones if None
-    each: str | None = None  # data of which every line has rows of its own: d[each] is then one
+    each: str | None = None  # a table in data: every line of it has these rows, and is d[each]
 
 
 @dataclass(frozen=True, eq=False)
 class Hard:
-    """Rows h <= 0; where no plan keeps to all of them, the plan is one that violates them least."""
+    """Rows h <= 0; where no plan satisfies all, riccati's plan violates them least."""
 
     each: ClassVar[str | None] = None
 
-    row: Callable[..., Any]  # as of `Soft`
-    stages: Any = None  # as of `Soft`
+    row: Callable[..., Any]  # as in `Soft`
+    stages: Any = None  # as in `Soft`
 
 
-Rows = dict[str, Soft | Hard]  # by their names in messages
+Rows = dict[str, Soft | Hard]  # by name in messages
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Data of every stage, taken where `Nmpc.solve` is given none."""
+    """Data that differ between stages, the default where `Nmpc.solve` is given none."""
 
-    values: Any  # an array with an axis of N + 1 in front
+    values: Any  # an array with a first axis of N + 1
 
 
 class Expressions(NamedTuple):
@@ -77,19 +77,19 @@ class Expressions(NamedTuple):
     u: ca.SX
     theta: ca.SX
     d: ca.SX  # of one stage
-    line: ca.SX  # of data, as of `Soft.each`
+    line: ca.SX  # of the table of `Soft.each`
     next_x: ca.SX
     stage: ca.SX
     terminal: ca.SX
     initial: ca.SX
-    fixed: ca.SX  # h and then g, but for the rows of lines of data
-    each: ca.SX  # the rows of a line
+    fixed: ca.SX  # h and then g, without the rows of lines
+    each: ca.SX  # the rows of one line
 
 
 class Problem(Described):
-    """What an NMPC minimises, in symbols of which each may be learned.
+    """The optimal control problem that an NMPC solves, in symbols of which each may be learned.
 
-    It can be pickled and copied, whatever its functions are: as expressions they go along.
+    A problem of any functions can be pickled and copied: it keeps their expressions.
     """
 
     def __init__(
@@ -113,34 +113,32 @@ class Problem(Described):
         data: Mapping[str, Any] | None = None,
         scale: Any = None,
     ) -> None:
-        """Write the problem down in symbols and look through it.
+        """Evaluate the functions in symbols and refuse what no solver can use.
 
-        The functions take SX and return SX: `x` and `u` are columns, `th["A"]` is the parameter of
-        that name in its shape. Where there are data, `d["price"]` is that of the stage, and `d` is
-        the last argument of all of them.
+        The functions take SX and return SX: `x` and `u` are columns, `th["A"]` is the parameter A
+        in its shape. With data, the last argument of every function is `d`: `d["price"]` is the
+        price of the stage.
 
         Args:
             states: n.
             inputs: m.
             horizon: N, the number of planned inputs.
-            theta: what is learned: by name, an array to start from, or a `Parameter`.
+            theta: the learned parameters by name: an array to start from, or a `Parameter`.
             model: (x, u, th) -> x+, a discrete-time map; `rk4` makes one of a derivative.
             stage: (x, u, th) -> l.
             terminal: (x, th) -> V_f, 0 if absent.
             initial: (x, th) -> V0 of the state in which the plan begins, 0 if absent.
-            soft: rows that may be violated at a price, a `Soft` or several. A kink in a cost is
-                written as rows: w |h| is Soft(lambda x, u, th: ca.vertcat(h, -h), weight=w).
-            hard: rows that must not be violated, a `Hard` or several.
+            soft: rows with a price, a `Soft` or several. A kink in a cost is written as rows:
+                w |h| is Soft(lambda x, u, th: ca.vertcat(h, -h), weight=w).
+            hard: rows without slacks, a `Hard` or several.
             lower: least input, a number or one an input.
             upper: largest input.
-            state_lower: least state of the stages 1, ..., N, as of `hard`; a number or one a state.
+            state_lower: least state of stages 1, ..., N, a hard bound; a number or one a state.
             state_upper: largest state.
             gamma: discount factor, 0 < gamma <= 1.
-            data: what is known of every stage and not learned: by name, the array of one stage, or
-                a `Series` of all, that is taken where `Nmpc.solve` is given none.
-            scale: typical sizes of the states, a number or one a state: it is solved in these
-                units. Absent, they are 1, or what the costs say where that is below 0.01 or
-                above 10,000.
+            data: known numbers of the stages by name: an array for all stages, or a `Series`.
+            scale: typical sizes of the states, a number or one a state, used as units; by default
+                1, or sizes read from the costs where these lie below 0.01 or above 10,000.
         """
         self.states = positive_integer("states", states)
         self.inputs = positive_integer("inputs", inputs)
@@ -160,7 +158,7 @@ class Problem(Described):
         self.sizes = _sizes(scale, self)
 
     def _take_theta(self, theta: Mapping[str, Any]) -> None:
-        """Names, starts and bounds of the parameters."""
+        """Set names, starts and bounds of the parameters."""
         starts, lower, upper = {}, [], []
         for name, one in theta.items():
             given = one if isinstance(one, Parameter) else Parameter(one)
@@ -180,7 +178,7 @@ class Problem(Described):
         self.theta_lower, self.theta_upper = map(read_only, map(np.concatenate, (lower, upper)))
 
     def _take_data(self, data: Mapping[str, Any], family: str | None) -> None:
-        """Names and defaults of the data of a stage; the table `family` comes last."""
+        """Set names and defaults of the data; the table `family` comes last."""
         arrays, shapes = {}, {}
         for name, one in sorted(data.items(), key=lambda item: item[0] == family):
             values = one.values if isinstance(one, Series) else one
@@ -203,7 +201,7 @@ class Problem(Described):
         rows: Rows,
         family: str | None,
     ) -> None:
-        """The problem as a function that can be pickled; weights and stages of its rows."""
+        """Set the function of all expressions, and weights, stages and inputs of the rows."""
         x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
         theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.own_names.size)
         line = ca.SX.sym("line", self.width)
@@ -220,7 +218,7 @@ class Problem(Described):
         final = expression("terminal", terminal, *alone, 1, "cost")
         first = expression("initial", initial, *alone, 1, "cost")
         none = ca.SX(0, 1), np.zeros(0), np.zeros((self.horizon + 1, 0), bool), np.zeros(0, bool)
-        fixed, each = [none], [none]  # rows, their W, whether they hold at each stage, and on u
+        fixed, each = [none], [none]  # rows, W, at which stages they hold, whether they depend on u
         for name, one in rows.items():
             row = expression(name, one.row, *(of_line if one.each else both), 0, "row")
             if not _depends(row, ca.vertcat(x, u)).all():
@@ -253,20 +251,20 @@ class Problem(Described):
 
     @property
     def soft(self) -> NDArray[np.bool_]:
-        """Which rows have a slack."""
+        """Whether a row has a slack."""
         found: NDArray[np.bool_] = np.isfinite(self.weights)
         return found
 
     def own(self, data: Any) -> Any:
-        """Data of a stage, or of all, that belong to no line."""
+        """The data of one stage or of all without the lines."""
         return data[..., : self.own_names.size]
 
     def rows(self, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
-        """h and g of a stage, those of lines last, shape (M,); `data` are all of the stage."""
+        """h and g of a stage with its data, lines last, shape (M,)."""
         return self._of_rows(self._function, x, u, theta, data)
 
     def _of_rows(self, function: ca.Function, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
-        """The last results of a function, of fixed rows and of a line's, for all lines."""
+        """The last two results of a function, of fixed rows and of a line, for all lines."""
         own, width = self.own_names.size, self.width
         given = x, u, theta, data[:own]
         fixed = function(*given, ca.DM.zeros(width))[-2]
@@ -276,13 +274,13 @@ class Problem(Described):
 
     @cached_property
     def cost_scale(self) -> float:
-        """The size of the costs at rest, half of their largest curvature or a slope."""
+        """Half of the costs' largest curvature at rest, or their largest slope."""
         curvature, slope = _bends(self, self.gamma**self.horizon)
         found = max(np.abs(curvature).max() / 2, np.abs(slope).max())
         return float(found) if 0 < found < np.inf else 1.0
 
     def row_sizes(self, rows: ca.SX) -> ca.SX:
-        """The size of each row, its slope along `sizes`, or 1 between `SMALL` and `LARGE`."""
+        """The slope of each row along `sizes`; 1 where it lies between `SMALL` and `LARGE`."""
         e = self.expressions
         slopes = ca.jacobian(rows, ca.vertcat(e.x, e.u))
         found = ca.densify(ca.mtimes(ca.fabs(slopes), ca.DM(np.concatenate(self.sizes))))
@@ -299,9 +297,9 @@ class Problem(Described):
 
     @cached_property
     def typical_row_sizes(self) -> Vector:
-        """The largest of `row_sizes` among states of the sizes -1, 0 and 1, or 1, shape (M,).
+        """The largest of `row_sizes` at states of -1, 0 and 1 times `sizes`, shape (M,).
 
-        A row that nothing moves there, as where its data are zeros, has no size to be read.
+        1 for a row that nothing moves there, as where its data are zeros.
         """
         given = [ca.DM(one) for one in (self.still, self.theta, self.data[0])]
         at = [self.all_row_sizes(ca.DM(k * self.sizes[0]), *given) for k in (-1, 0, 1)]
@@ -315,7 +313,7 @@ class Problem(Described):
 
     @cached_property
     def solved(self) -> "Problem":
-        """The same problem with states and inputs in parts of `sizes`, which is what is solved."""
+        """The problem that is solved: states and inputs in units of `sizes`."""
         if all((size == 1).all() for size in self.sizes):
             return self
         (states, inputs), other = self.sizes, copy(self)
@@ -330,29 +328,29 @@ class Problem(Described):
 
     @cached_property
     def machine_code(self) -> dict[str, Any]:
-        """What was compiled for it, by name."""
+        """Functions compiled for this problem, by name."""
         return {}
 
     def split(self, theta: Vector) -> dict[str, Any]:
-        """A vector in the order of theta, or of its gradient, by name."""
+        """The parts of theta, or of a gradient in theta, by name."""
         return self.names.split(np.asarray(theta, float))
 
     def vector(self, **values: Any) -> Vector:
-        """theta with these parameters, and the others as they start."""
+        """theta with these parameters, and the starts of the others."""
         return self.names.filled(self.theta, values)
 
     def stage_data(self, values: Mapping[str, Any] | None) -> Matrix:
-        """d_0, ..., d_N, shape (N + 1, size): those given, the others as in the problem."""
+        """d_0, ..., d_N, shape (N + 1, size), with these values and the defaults of the others."""
         return self._known if values is None else self.data_names.filled(self.data, values)
 
     @cached_property
     def _known(self) -> Matrix:
-        """The data as machine code takes them, which could be written to and are not."""
+        """A writeable copy of the data: machine code refuses read-only arrays."""
         return self.data.copy()
 
 
 def _bends(problem: Problem, share: float) -> tuple[Matrix, Matrix]:
-    """Hessian and gradient in (x, u) of a stage's cost and a share of the last, around 0."""
+    """Hessian and gradient in (x, u), at rest in 0, of l plus a share of V_f."""
     e = problem.expressions
     z, costs = ca.vertcat(e.x, e.u), e.stage + share * e.terminal
     both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
@@ -366,9 +364,9 @@ def _ones(problem: Problem) -> tuple[Vector, Vector]:
 
 
 def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
-    """In which units states and inputs are solved: powers of 2, so that nothing is rounded.
+    """The units of states and inputs: powers of 2, so that nothing is rounded.
 
-    Neither horizon nor gamma changes them, and with them what is compiled.
+    They depend on neither horizon nor gamma, and so does the compiled code.
     """
     bends = np.diag(_bends(problem, 1.0)[0])
     usual = np.where((bends > 0) & (bends < np.inf), np.maximum(bends, LEAST) ** -0.5, 1.0)
@@ -384,7 +382,7 @@ def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
 
 
 def _rows(name: str, given: Any, kind: Any) -> Rows:
-    """Rows by their names in messages."""
+    """Rows by name in messages."""
     several = given if isinstance(given, Iterable) else (given,)
     found = {f"{name}[{k}]": one for k, one in enumerate(several)}
     for place, one in found.items():
@@ -397,7 +395,7 @@ def _rows(name: str, given: Any, kind: Any) -> Rows:
 
 
 def _family(rows: Rows, data: Mapping[str, Any]) -> str | None:
-    """The data that `Soft.each` names."""
+    """The table that `Soft.each` names."""
     for name, one in rows.items():
         if one.each is not None and one.each not in data:
             raise ValueError(f"{name}.each = {one.each!r} must be the name of data")
@@ -422,7 +420,7 @@ def _stages(name: str, asked: Any, last: int, *, on_inputs: bool) -> NDArray[np.
 
 
 def _depends(rows: ca.SX, variables: ca.SX) -> NDArray[np.bool_]:
-    """Which rows depend on any of these."""
+    """Whether a row depends on any of the variables."""
     if not rows.numel() or not variables.numel():
         return np.zeros(rows.numel(), bool)
     return np.array(ca.which_depends(rows, variables, 1, True), bool)

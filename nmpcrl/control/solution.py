@@ -1,4 +1,4 @@
-"""What a solve gives back: an optimum, or an error that says where there was none."""
+"""The result of a solve: a `Solution`, or a `SolverError`."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -24,7 +24,7 @@ class SolverError(RuntimeError):
 
 
 class DerivativeError(SolverError):
-    """An optimum without a derivative in theta, though a gradient of its value there is."""
+    """The optimum has no derivative in theta, though its value has a gradient."""
 
 
 class Status(StrEnum):
@@ -67,10 +67,10 @@ class Solution:
     seconds: float  # wall time of the solve and the gradient [s]
     point: Vector  # z, lam and nu, one after the other, each in the order of `ocp`
     ocp: Ocp  # says where each part lies
-    solver: str  # the name of what found it
+    solver: str  # the name of the solver that found it
+    data: Matrix  # d_0, ..., d_N, shape (N + 1, size)
     restarts: int = 0  # how often the solver had to begin again
     violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
-    data: Matrix | None = None  # d_0, ..., d_N of a `Problem`, shape (N + 1, size)
     took_over: bool = False  # whether another solver found it than the one that was asked
 
     @property
@@ -84,8 +84,7 @@ class Solution:
     def parameters(self) -> Vector:
         """p of `ocp`."""
         action = self.action[: self.ocp.fixed_action.size]
-        data = self.ocp.problem.data if self.data is None else self.data
-        return np.concatenate([self.state, self.theta, action, data.ravel()])
+        return np.concatenate([self.state, self.theta, action, self.data.ravel()])
 
     @property
     def primal(self) -> Vector:

@@ -1,6 +1,6 @@
-"""A `Problem` in units in which its states and inputs are of size 1, and its solutions in its own.
+"""A `Problem` in units in which states and inputs are of size 1, and its solutions in both units.
 
-No solver is indifferent to units: with states of 1e-6 the errors that are allowed exceed the plan.
+No solver is indifferent to units: with states of 1e-6 the allowed errors exceed the plan.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ from nmpcrl.control.solution import Solution
 
 
 class Units:
-    """An OCP, and `ocp`, which is solved in its place: the same where all units are 1."""
+    """An OCP and the one that is solved in its place, `ocp`: itself if `own`, where units are 1."""
 
     def __init__(self, ocp: Ocp) -> None:
         self._outer, self.ocp, solved = ocp, ocp, ocp.problem.solved
@@ -24,7 +24,7 @@ class Units:
             self.ocp = transcribe(solved, fix_action=fixed, ties_active=ocp.ties_active)
 
     def inside(self, solution: Solution) -> Solution:
-        """A solution in the units in which it was found."""
+        """A solution in the units of `ocp`."""
         if self.own:
             return solution
         return replace(

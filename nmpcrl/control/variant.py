@@ -1,4 +1,4 @@
-"""One OCP with u_0 free or fixed: a solver that is ready for it, and its derivatives."""
+"""Eq. (2) with u_0 free or fixed: its OCP, its solver and its derivatives."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +18,7 @@ from nmpcrl.control.units import Units
 
 
 class Variant:
-    """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
+    """An OCP with its solver and its derivatives."""
 
     def __init__(self, ocp: Ocp, solver: Solver) -> None:
         self.ocp, self.units = ocp, Units(ocp)
@@ -27,7 +27,7 @@ class Variant:
 
     @property
     def machine(self) -> Compiled | None:
-        """The compiled solver; None where another one solves, or this one in units of its own."""
+        """The compiled solver; None where another one solves, or where units are not 1."""
         return self.solver if self.units.own and isinstance(self.solver, Compiled) else None
 
     def _solve_in_units(
@@ -38,7 +38,7 @@ class Variant:
         *action: Vector,
         **others: Any,
     ) -> Solution:
-        """As `Prepared.solve`, of a problem that is solved in other units than its own."""
+        """`Prepared.solve` in the units of `Units.ocp`."""
         units = self.units
         begin = None if warm_start is None else units.inside(warm_start)
         scaled = [one / units.inputs for one in action]
@@ -79,13 +79,13 @@ class Variant:
     def _compiled(
         self, derivative: Callable[..., Vector | None], solution: Solution, *along: Vector
     ) -> Any:
-        """A derivative of the compiled solver at a solution; None where there is none."""
+        """A derivative by the compiled solver; None where it has none."""
         if not isinstance(self.solver, Compiled):
             return None
         return derivative(self.solver, self.units.inside(solution), *along)
 
     def _dense(self, derivative: Callable[..., Matrix], solution: Solution) -> Matrix:
-        """A derivative of `Sensitivity` at a solution; DerivativeError where there is none."""
+        """A derivative by `Sensitivity`; DerivativeError where it has none."""
         try:
             return derivative(*_point(self.units.inside(solution)))
         except np.linalg.LinAlgError as error:
@@ -101,7 +101,7 @@ class Variant:
 
     @cached_property
     def _in_state(self) -> Sensitivity:
-        """The derivatives in the initial state in place of theta."""
+        """Derivatives in the initial state in place of theta."""
         ocp = self.units.ocp
         return Sensitivity(replace(ocp, theta=ocp.parameters[: ocp.problem.states]))
 

@@ -1,4 +1,4 @@
-"""Checks and copies of the numbers of a description."""
+"""Checked, read-only copies of a user's numbers."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from nmpcrl import Vector
 
 
 def read_only(numbers: Any) -> Vector:
-    """A read-only copy, independent of the array that it was made of."""
+    """A read-only copy."""
     copy = np.array(numbers, float)
     copy.setflags(write=False)
     return copy
@@ -24,10 +24,9 @@ def positive_integer(name: str, number: Any) -> int:
 def spread(
     name: str, value: Any, shape: tuple[int, ...], each: str, *, positive: bool = False
 ) -> Vector:
-    """A read-only array of a shape, of one number or as many, `each` belonging to something.
+    """A read-only array of a shape, of a number or one for `each` of something.
 
-    Raises:
-        ValueError: the value has another shape, holds nan, or is not `positive` and finite.
+    ValueError for another shape, for nan, and for numbers that are not `positive` and finite.
     """
     array = np.array(value, float)
     kind = "positive numbers" if positive else "numbers"

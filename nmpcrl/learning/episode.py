@@ -216,7 +216,8 @@ class Loop:
         if done > first:
             nmpc, weights = self._nmpc, Weights(theta, w)
             x, none = point[: state.size], np.empty(0)
-            warm = Solution(x, theta, np.nan, none, 0, 0.0, point, nmpc.ocp, nmpc.solver.name)
+            how, data = nmpc.solver.name, nmpc.problem.stage_data(None)
+            warm = Solution(x, theta, np.nan, none, 0, 0.0, point, nmpc.ocp, how, data)
         return done, state, weights, warm
 
     def _bootstrap(self, steps: int) -> tuple[Any, ...]:

@@ -192,9 +192,9 @@ class Compiled:
                 out[: self._split],
                 self._ocp,
                 NAME,
+                data,
                 int(failed),
                 violation,
-                data,
             )
         try:
             found = self._fatrop.solve(state, theta, None, *action, began=began, data=data)
@@ -242,10 +242,9 @@ class Compiled:
         if solution.took_over:  # whose states are not rolled out
             return None
         action = solution.action if self._fixed else self._no_action
-        data = self.arguments.data if solution.data is None else solution.data
         given = (solution.state, solution.theta, action, self._fixed, solution.point)
         states, out = np.zeros(self._ocp.states.shape), np.empty(solution.theta.size + more)
-        formed = self.slopes(data, *self._rest, *given, along, states, inputs, out)
+        formed = self.slopes(solution.data, *self._rest, *given, along, states, inputs, out)
         return out if formed else None
 
     @cached_property
