@@ -74,9 +74,6 @@ def test_the_grid_has_eleven_points_over_theta_c_alone(budget, made):
     assert best[-1] == pytest.approx(0.2, abs=0.02)
 
 
-# The long search.
-
-
 @pytest.fixture
 def bowl(monkeypatch):
     """A `Bowl` in the place of rollouts."""

@@ -13,9 +13,6 @@ from nmpcrl.analysis.statistics import CONFIDENCE, Estimate, interquartile_mean,
 LAYOUTS = np.repeat(list("ABCDEF"), 20)  # the strata of the main table
 
 
-# Rates
-
-
 @pytest.mark.parametrize(("held", "of"), [(0, 5), (1, 7), (60, 120), (119, 120), (4, 4)])
 def test_the_interval_of_a_rate_holds_what_lies_within_two_of_its_own_deviations(held, of):
     """Wilson's bounds are the p at which (held / of - p)^2 = z^2 p (1 - p) / of."""
@@ -39,9 +36,6 @@ def test_pairs_that_change_go_either_way_with_the_same_chance(gained, lost):
     changed, fewer = gained + lost, min(gained, lost)
     tail = sum(comb(changed, i) for i in range(fewer + 1)) / 2**changed
     assert statistics.paired_p(gained, lost) == pytest.approx(min(1.0, 2 * tail))
-
-
-# The interquartile mean
 
 
 @pytest.mark.parametrize(
@@ -69,9 +63,6 @@ def test_draws_stay_within_a_layout_and_repeat_and_need_two_runs():
     assert np.isnan([single.low, single.high]).all()
 
 
-# The probability of improvement
-
-
 def test_the_probability_of_improvement_is_mann_and_whitney_s_u_over_the_number_of_pairs():
     rng = np.random.default_rng(4)
     first, second = rng.integers(0, 5, (2, 30)).astype(float)
@@ -90,9 +81,6 @@ def test_the_probability_of_improvement_is_mann_and_whitney_s_u_over_the_number_
 )
 def test_layouts_weigh_the_same_and_a_failure_ties_with_a_failure(first, second, layouts, value):
     assert statistics.probability_of_improvement(first, second, layouts).value == value
-
-
-# All of them
 
 
 @pytest.mark.weekly

@@ -32,9 +32,6 @@ def short(monkeypatch):
     monkeypatch.setattr(Experiment.__init__, "__defaults__", shortened)
 
 
-# The robot.
-
-
 def test_a_robot_trains_and_rolls_out_as_the_library_does_and_begins_no_episode_too_many():
     robot = Robot("B", 5, 0)
     noise = Exploration.draw(np.random.default_rng(0), (3, 3, 2))
@@ -69,9 +66,6 @@ def test_among_moving_obstacles_the_environment_is_that_of_a_rollout():
     assert over
     with pytest.raises(suite.OverBudget):
         robot.cost(THETA)
-
-
-# Entries.
 
 
 @pytest.mark.usefixtures("short")
@@ -158,9 +152,6 @@ def test_an_unknown_entry_a_failing_one_and_a_number_out_of_range_are_refused(
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Refusal, match=message):
         judge_all(name, **options)
-
-
-# Judging.
 
 
 def test_theta_and_a_policy_are_judged_alike_by_the_cost_of_a_rollout():
@@ -263,8 +254,6 @@ def test_seeds_are_held_out_and_no_two_places_share_one():
     assert min(seeds) >= suite.HELD_OUT
     assert suite.seed_of("J004", 1) == 1_000_301
 
-
-# The leaderboard.
 
 MISSED, POOR = replace(GOOD, arrived=False), replace(GOOD, cost=4000.0)
 OVER, INSIDE = replace(GOOD, over=True), replace(GOOD, inside=3)

@@ -6,15 +6,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.investigation import (
-    NAMES,
-    Answer,
-    Investigation,
-    Part,
-    Question,
-    lower,
-    means,
-)
+from nmpcrl.claims.investigation import NAMES, Answer, Investigation, Part, Question, lower, means
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE
 from nmpcrl.study import published
 from nmpcrl.study.provenance import EPOCHS

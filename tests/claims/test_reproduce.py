@@ -12,16 +12,7 @@ from quiet_rows import timings
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import reproduce
 from nmpcrl.claims.published import Evidence, Published
-from nmpcrl.claims.reproduce import (
-    agreement,
-    comparable,
-    compare,
-    contradictions,
-    of_runs,
-    of_times,
-    relock,
-    sample,
-)
+from nmpcrl.claims.reproduce import compare, contradictions, of_runs, of_times, relock
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import Experiment, design, lock, provenance, sweep
 from nmpcrl.study.experiment import frozen_arm
@@ -128,8 +119,8 @@ def test_a_batch_is_comparable_where_this_machine_made_it(study):
     known = with_part(known, more, "alpha x 3")
     batches = (*known.batches, HERE | {"runs": {"alpha x 3": 1}})
     added = replace(known, about={"batches": batches})
-    assert comparable([more, *rest], known) == set()
-    assert comparable([more, *rest, Experiment(seed=99)], added) == {more}
+    assert reproduce.comparable([more, *rest], known) == set()
+    assert reproduce.comparable([more, *rest, Experiment(seed=99)], added) == {more}
 
 
 def verdict(outcome: Outcome, interval: tuple[float, float] | None = None) -> Verdict:
@@ -198,11 +189,11 @@ def test_published_runs_made_again_are_counted_by_how_equal_they_are(study):
         found
         | {first: scaled(moved(found[first]), 1 + 1e-9, 0), second: scaled(found[second], 2.0)}
     )
-    made = agreement(found, with_part(known, third, "N = 5"))
+    made = reproduce.agreement(found, with_part(known, third, "N = 5"))
     assert (made.runs, made.equal, made.close) == (len(found) - 1, len(found) - 3, 1)
     every = ["C1", "C2", "C5", "C6", "C7", "C9", "W7", "W9", "B1", "B2", "B3", "B4"]
     assert [one.claim for one in made.here] == [one.claim for one in made.there] == every
-    assert agreement({}, Published()) == reproduce.Agreement(0, 0, 0, (), ())
+    assert reproduce.agreement({}, Published()) == reproduce.Agreement(0, 0, 0, (), ())
 
 
 SHORT = {"episodes": 2, "steps": 3, "evaluate_every": 1}
@@ -213,11 +204,11 @@ KNOWN = Published(dict.fromkeys(PARTS), pd.DataFrame({"variant": PARTS.values()}
 
 
 def test_a_sample_is_spread_over_parts_and_learners():
-    assert sample(PARTS, 2) == (MAIN[0], OTHER[0])
-    four = sample(PARTS, 4)
+    assert reproduce.sample(PARTS, 2) == (MAIN[0], OTHER[0])
+    four = reproduce.sample(PARTS, 4)
     assert {PARTS[e] for e in four[:2]} == {PARTS[e] for e in four[2:]} == {"main", "N = 5"}
     assert {e.learner for e in four if PARTS[e] == "main"} == {"ES", "GES"}
-    assert set(sample(PARTS, 99)) == set(PARTS)
+    assert set(reproduce.sample(PARTS, 99)) == set(PARTS)
 
 
 @pytest.fixture
@@ -241,7 +232,7 @@ def edit(monkeypatch, times=1.0, code="edited"):
 
 def train_here():
     with ThreadPoolExecutor(1) as executor:
-        summaries.fetch_summaries(sample(PARTS, 4), executor=executor, progress=False)
+        summaries.fetch_summaries(reproduce.sample(PARTS, 4), executor=executor, progress=False)
 
 
 def test_the_lock_is_written_where_no_bit_has_changed(locked, monkeypatch):

@@ -8,15 +8,7 @@ from hypothesis import strategies as st
 
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.rule import (
-    CELL,
-    Answers,
-    arms,
-    counted,
-    drawn_anew,
-    read,
-    settle,
-)
+from nmpcrl.claims.rule import CELL, Answers, arms, counted, drawn_anew, read, settle
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 
 CLAIM = CLAIMS["C1"]

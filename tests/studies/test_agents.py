@@ -4,14 +4,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.studies.agents import (
-    AGENTS,
-    CHECKPOINTS,
-    PARTS,
-    SAC_AND_TD3,
-    SETTINGS,
-    tuned,
-)
+from nmpcrl.studies.agents import AGENTS, CHECKPOINTS, PARTS, SAC_AND_TD3, SETTINGS, tuned
 from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.refusal import Refusal

@@ -11,24 +11,7 @@ from nmpcrl.claims.investigation import Condition, rounded
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report import editions
 from nmpcrl.studies import remedies, worlds
-from nmpcrl.studies.remedies import (
-    ADVISED,
-    FIRST,
-    LATER,
-    NEVER,
-    OPEN,
-    PARTS,
-    REMEDIES,
-    SECOND,
-    SETTINGS,
-    YARDSTICK,
-    advice,
-    arms,
-    best_setting,
-    rows,
-    shares,
-    solved,
-)
+from nmpcrl.studies.remedies import FIRST, LATER, NEVER, OPEN, PARTS, REMEDIES, SECOND, arms
 from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.refusal import Refusal
 
@@ -77,15 +60,15 @@ def tune(entry, *gains, **fields):
 )
 def test_what_is_gained_and_what_is_solved(runs, share, well):
     found = table(*runs)
-    assert shares(found).tolist() == pytest.approx(share)
-    assert solved(found).tolist() == well
-    (one,) = rows(found)
+    assert remedies.shares(found).tolist() == pytest.approx(share)
+    assert remedies.solved(found).tolist() == well
+    (one,) = remedies.rows(found)
     assert (one.layouts, one.left_out, one.rollouts) == (len(well), len(well) - len(share), 50)
 
 
 def test_the_best_setting_has_the_greatest_gain_and_is_the_first_of_equal_ones():
-    assert best_setting(table(*tune("ES", 0.2, -np.inf, 0.4, 0.4))) == "ES[alpha=3e-07]"
-    assert best_setting(table(*tune("ES", -np.inf))) == "ES"
+    assert remedies.best_setting(table(*tune("ES", 0.2, -np.inf, 0.4, 0.4))) == "ES[alpha=3e-07]"
+    assert remedies.best_setting(table(*tune("ES", -np.inf))) == "ES"
 
 
 @pytest.mark.parametrize(
@@ -114,14 +97,14 @@ def test_the_best_setting_has_the_greatest_gain_and_is_the_first_of_equal_ones()
     ],
 )  # fmt: skip
 def test_advice_follows_its_rule(blocks, expected):
-    found = advice(table(*(one for some in blocks for one in some)))
+    found = remedies.advice(table(*(one for some in blocks for one in some)))
     assert [*dict(zip(found.entry, found.word, strict=True)).items()] == expected
 
 
 def test_the_tuning_is_part_of_the_price_and_rows_come_by_budget():
     runs = (*tune("ES", 0.1, 0.2), *block("ES", "judge 300"), *block("ES"))
-    found = advice(table(*runs))
-    assert [*found.part] == [*ADVISED]
+    found = remedies.advice(table(*runs))
+    assert [*found.part] == [*remedies.ADVISED]
     assert {*found.tuning} == {2 * 15 * 50}
 
 
@@ -167,8 +150,8 @@ def test_questions_are_answered_by_their_rule(name, runs, outcome, count):
 
 
 def test_every_entry_is_compared_and_begins_its_tuning_with_its_default():
-    assert [*SETTINGS] == [*ENTRIES]
-    for entry, settings in SETTINGS.items():
+    assert [*remedies.SETTINGS] == [*ENTRIES]
+    for entry, settings in remedies.SETTINGS.items():
         assert bool(settings) == bool(ENTRIES[entry].defaults)
         assert next(iter(arms(entry))) == entry
         assert len(arms(entry)) == max(len(settings), 1)
@@ -181,7 +164,7 @@ def judged(tmp_path, monkeypatch, trains_here):
 
     def judge(entry, place, seed, episodes):
         asked.append((str(entry), place, seed, episodes))
-        cost = 3000.0 if episodes == YARDSTICK else 3200.0 if entry.changed else 3500.0
+        cost = 3000.0 if episodes == remedies.YARDSTICK else 3200.0 if entry.changed else 3500.0
         return Judgement(4000.0, cost, True, min(episodes, 50), seconds=2.0)
 
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
@@ -195,7 +178,8 @@ def test_rows_are_made_in_order_and_the_best_setting_is_judged(judged):
     with pytest.raises(Refusal, match=r"J_best of T01 .* 'best' comes first"):
         REMEDIES.complete(["tune"], workers=1)
     REMEDIES.complete(["best"], workers=1)
-    assert {(one[0], *one[2:]) for one in judged[-141:]} == {("CMA-ES", 9_000_000, YARDSTICK)}
+    search = ("CMA-ES", 9_000_000, remedies.YARDSTICK)
+    assert {(one[0], *one[2:]) for one in judged[-141:]} == {search}
     with pytest.raises(Refusal, match="ES is not tuned yet: the part 'tune' comes first"):
         REMEDIES.conditions("judge 50")
     REMEDIES.complete(["tune", "judge 300"], workers=1)
@@ -230,7 +214,7 @@ def test_worlds_begin_anew_with_the_entry_to_try_first():
     said = {one.name for one in editions.first() if one.outcome == f"try {FIRST}"}
     assert said == {f"advice on {suite.entry(worlds.REMEDY).name}"}
     if not any(map(REMEDIES.is_current, PARTS)):
-        assert next(advice(REMEDIES.table()).itertuples()).name == worlds.REMEDY
+        assert next(remedies.advice(REMEDIES.table()).itertuples()).name == worlds.REMEDY
 
 
 @pytest.mark.weekly
