@@ -47,7 +47,6 @@ HELD_OUT = 1_000_000  # the first seed; the study's seeds are below 100
 TOLERANCE = 1e-9  # relative, of two costs that are compared
 LAYOUTS: Mapping[str, Centres] = {**JUDGE, **TUNE, **paper.LAYOUTS}
 THETA = np.array(paper.THETA_INIT)
-BOUNDS = (LOWER, UPPER)  # of theta, for learners with a trust region
 RETURNED = numbers([number(-1e300, 1e300)] * THETA.size, f"{THETA.size} finite numbers or a policy")
 ACTION = numbers([number(-1e300, 1e300)] * 2, "2 finite numbers")
 NO_ROLLOUT = Rollout(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros(0), failure="not begun")
@@ -210,8 +209,16 @@ def _guarded(learner: Learner, _: Robot, alpha: float) -> Learner:
     return remedies.guarded(learner, alpha)
 
 
-def _gn_j(_: Learner, robot: Robot, radius: float) -> Learner:
-    return closed_loop(robot.controller, TrustRegion(radius, SCALE), BOUNDS)
+def _of_controller(make: Callable[..., Learner]) -> Change:
+    """A learner of the controller, in the place of the study's."""
+    return lambda _, robot, **settings: make(robot.controller, **settings)
+
+
+def _bounded(make: Callable[..., Learner]) -> Change:
+    """A learner of the controller with a trust region, in the place of the study's."""
+    return lambda _, robot, radius: make(
+        robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=(LOWER, UPPER)
+    )
 
 
 def _undone(change: Change) -> Change:
@@ -237,33 +244,27 @@ def _searched(name: str) -> Entry:
 
 
 ALPHA, RADIUS = paper.ALPHA, 0.3  # step size; radius of trust regions, in `SCALE`s
-ENTRIES: Mapping[str, Entry] = {
-    one.name: one
-    for one in (
-        Entry("frozen", lambda _: THETA.copy()),
-        _searched("grid"),
-        *(_learned(one, learner=one, alpha=ALPHA) for one in ("ES", "GES", "TDC", "RDES", "DES")),
-        _learned("TDRC", lambda _, robot, **own: remedies.tdrc(robot.controller, **own),
-                 alpha=ALPHA, regularisation=remedies.REGULARISATION),
-        _learned("GES-3", lambda _, robot, **own: remedies.normalised_ges(robot.controller, **own),
-                 alpha=ALPHA, ratio=3.0),
-        _learned("guarded-ES", _guarded, alpha=ALPHA),
-        _learned("guarded-RDES", _guarded, "RDES", alpha=ALPHA),
-        _learned("control-RDES", lambda learner, _, alpha: remedies.directed(
-            remedies.guarded(learner, alpha), alpha), "RDES", alpha=ALPHA),
-        _learned("averaged-ES", lambda learner, robot, **_: remedies.averaged(
-            learner, robot.budget * paper.STEPS // 2), alpha=ALPHA),
-        _learned("undone-ES", _undone(lambda learner, *_, **__: learner), alpha=ALPHA, every=1),
-        _learned("undone-LSTD-Q", _undone(lambda _, robot, radius: learning.lstd_q(
-            robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS)),
-            radius=RADIUS, every=1),
-        _learned("GN-J", _gn_j, radius=RADIUS),
-        _learned("undone-GN-J", _undone(_gn_j), radius=RADIUS, every=1),
-        _learned("DPG", lambda _, robot, radius: learning.policy_gradient(
-            robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS), radius=RADIUS),
-        *map(_searched, ("SPSA", "CMA-ES", "Bayes")),
-    )
-}  # fmt: skip
+_ENTRIES = (
+    Entry("frozen", lambda _: THETA.copy()),
+    _searched("grid"),
+    *(_learned(one, learner=one, alpha=ALPHA) for one in ("ES", "GES", "TDC", "RDES", "DES")),
+    _learned("TDRC", _of_controller(remedies.tdrc), alpha=ALPHA,
+             regularisation=remedies.REGULARISATION),
+    _learned("GES-3", _of_controller(remedies.normalised_ges), alpha=ALPHA, ratio=3.0),
+    _learned("guarded-ES", _guarded, alpha=ALPHA),
+    _learned("guarded-RDES", _guarded, "RDES", alpha=ALPHA),
+    _learned("control-RDES", lambda learner, _, alpha: remedies.directed(
+        remedies.guarded(learner, alpha), alpha), "RDES", alpha=ALPHA),
+    _learned("averaged-ES", lambda learner, robot, **_: remedies.averaged(
+        learner, robot.budget * paper.STEPS // 2), alpha=ALPHA),
+    _learned("undone-ES", _undone(lambda learner, *_, **__: learner), alpha=ALPHA, every=1),
+    _learned("undone-LSTD-Q", _undone(_bounded(learning.lstd_q)), radius=RADIUS, every=1),
+    _learned("GN-J", _bounded(closed_loop), radius=RADIUS),
+    _learned("undone-GN-J", _undone(_bounded(closed_loop)), radius=RADIUS, every=1),
+    _learned("DPG", _bounded(learning.policy_gradient), radius=RADIUS),
+    *map(_searched, ("SPSA", "CMA-ES", "Bayes")),
+)  # fmt: skip
+ENTRIES: Mapping[str, Entry] = {one.name: one for one in _ENTRIES}
 
 
 def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
