@@ -16,7 +16,7 @@ import nmpcrl
 from nmpcrl.bench.solves import closed_loop, watched
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.files import folder, write_json
-from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.refusal import Refusal
 
 Live = dict[str, Any]  # numbers by what is measured; what could not be is absent
 

@@ -17,7 +17,7 @@ from nmpcrl.bench.problem_sizes import VARIED, Sizes, times
 from nmpcrl.bench.solves import columns_of
 from nmpcrl.study.files import check_folder, folder
 from nmpcrl.study.limits import need_numba
-from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.refusal import Refusal
 
 FILE = "problem_times.json"
 STEPS = 1000  # of a run in Chapter 10

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
-from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.refusal import Refusal
 
 MIME = "application/vnd.nmpcrl.check+json"  # of what the page is given
 STRICT = bool(os.environ.get("NMPCRL_STRICT"))  # no answer can change it later

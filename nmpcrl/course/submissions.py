@@ -14,7 +14,7 @@ from symtable import symtable
 from typing import Any
 
 from nmpcrl.course.exercises import HEAD, Cell, Exercise, Notebook, exercises
-from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.refusal import Refusal
 
 SOLUTION = re.compile(r"\n### BEGIN SOLUTION\n.*?\n### END SOLUTION", flags=re.S)
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import LEARNERS, NETWORKS
-from nmpcrl.study.parameters import ParameterError, Refusal
 from nmpcrl.study.provenance import environment
+from nmpcrl.study.refusal import ParameterError, Refusal
 
 HOURS = 24.0  # of one core; the whole study takes about 5
 STEPS = 4_000_000  # of one run, whose tables then take about 4 GB of memory

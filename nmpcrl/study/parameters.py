@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.study.refusal import ParameterError as ParameterError
-from nmpcrl.study.refusal import Refusal as Refusal
 
 LARGEST_SEED = 2**31 - 1  # that the generators of all libraries take
 MOST_VALUES = 10_000  # of a list

@@ -7,7 +7,7 @@ import pytest
 
 from nmpcrl.bench import live
 from nmpcrl.bench.live_targets import live_targets
-from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.refusal import Refusal
 
 MET = {
     "page": [40.0, 42.0, 90.0],

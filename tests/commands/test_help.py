@@ -23,11 +23,3 @@ def test_help(name, tmp_path, monkeypatch):
         assert command == name or not name
         with main.make_context("nmpcrl", [command, *words]) as context:
             main.commands[command].make_context(command, words, context)
-
-
-def test_each_command_has_a_sentence_in_the_list():
-    text = CliRunner().invoke(main, ["--help"]).output
-    for name in main.commands:
-        (line,) = re.findall(rf"^  {name} +(.*(?:\n   +.*)*)$", text, re.M)
-        assert line.endswith(".")
-        assert not line.endswith("...")
