@@ -7,7 +7,7 @@ import pytest
 
 from nmpcrl.study import Experiment, fetch
 
-SLOW = ("torch", "pandas", "matplotlib", "scipy.stats", "numba")
+SLOW = ("torch", "pandas", "matplotlib", "scipy.stats", "numba", "gymnasium")
 LIGHT = (
     *("nmpcrl", "nmpcrl.control", "nmpcrl.learning", "nmpcrl.study", "nmpcrl.bench"),
     *("nmpcrl.analysis.metrics", "nmpcrl.analysis.summaries"),

@@ -58,7 +58,7 @@ class QuadraticController(LinearController):
 
 @dataclass
 class RecordingNetwork:
-    """Keeps what it is told and answers `answer`."""
+    """Records its examples and predicts `answer`."""
 
     batch: int = 3
     answer: float = 7.0

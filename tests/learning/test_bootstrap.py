@@ -1,4 +1,4 @@
-"""Where the next value comes from: what is solved, remembered and asked of the network."""
+"""Values of the next state: by a second solve, and by a network that imitates the NMPC."""
 
 from dataclasses import replace
 

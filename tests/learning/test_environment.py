@@ -1,4 +1,4 @@
-"""The environment need not be what plans: other plants, costs, starts and ends."""
+"""Environments other than the plan's model: plants, costs, starts, ends and data."""
 
 import re
 from dataclasses import replace
@@ -45,7 +45,7 @@ def cut(state, action, rng):
 
 
 @pytest.mark.parametrize("plant", [None, differential_drive(), differential_drive(period=0.1)])
-def test_a_plant_is_charged_the_tasks_cost_and_is_by_default_what_plans(robot, plant):
+def test_a_plant_is_charged_the_tasks_cost_and_is_by_default_the_plans(robot, plant):
     advance, task = (plant or robot.plant).step, robot.task
     rollout = evaluate(robot, THETA, 5, plant=plant)
     later = [advance(s, a) for s, a in zip(rollout.states, rollout.actions, strict=True)]
@@ -98,14 +98,14 @@ TWO_STATES = FILLING | {"plant": lambda s, a, rng: ([1, 2], 0, False)}
         ("robot", {"plant": SLOW}, NARROW),
     ],
 )
-def test_what_is_no_environment_is_refused(request, name, options, message):
+def test_arguments_that_make_no_environment_are_refused(request, name, options, message):
     nmpc = request.getfixturevalue(name)
     with pytest.raises(ValueError, match=message):
         evaluate(nmpc, nmpc.problem.theta, 1, **options)
 
 
 @pytest.mark.parametrize(
-    ("later", "end", "ran"),  # of one step, what follows 0.1, and whether the plant ran away
+    ("later", "end", "ran"),  # state, end of the episode, whether the plant ran away
     [(np.nan, False, True), (np.nan, True, True), (-np.inf, False, True), (2e9, False, True),
      (2e9, True, False), (1e9, False, False)],
 )  # fmt: skip
@@ -138,7 +138,7 @@ def test_an_error_inside_a_function_of_the_user_is_that_error(tank, broken):
 
 
 class Overwriting:
-    """A store that works in arrays that it is given or gave; in copies where it is careful."""
+    """A store that overwrites its arguments and results; where it is careful, copies of them."""
 
     def __init__(self, *, careful):
         self.own = np.copy if careful else np.asarray
@@ -224,8 +224,8 @@ def test_a_plan_sees_the_data_of_its_stages(tank):
     for state, action, prices in zip(rollout.states, rollout.actions, windows, strict=True):
         plan = tank.solve(state, theta, data={"price": prices})
         np.testing.assert_allclose(action, plan.action, atol=1e-6)
-    told = {"data": lambda t: {"price": windows[t] if t < 4 else 0.0}}
-    same = evaluate(tank, theta, 4, **SELLING | told)
+    called = {"data": lambda t: {"price": windows[t] if t < 4 else 0.0}}
+    same = evaluate(tank, theta, 4, **SELLING | called)
     np.testing.assert_array_equal(rollout.actions, same.actions)
 
 

@@ -1,4 +1,4 @@
-"""Episodes of the compiled loop are those of the generator, to the last bit."""
+"""The compiled loop makes the episodes of the generator, to the last bit."""
 
 from dataclasses import replace
 from functools import cache, partial
@@ -84,7 +84,7 @@ def rows_and_ends(made, rows_of):
 
 
 def assert_same(make, nmpc, explore=None, looped=True, **options):
-    """The columns, once they are known to be those of the generator."""
+    """Compare rows and ends of the loop and of the generator; return the columns."""
     given = nmpc, weights(), explore or noise()
     assert (Loop.of(Trainer(make(nmpc), *given, **options)) is not None) == looped
     expected, failures, stopped = rows_and_ends(train(make(nmpc), *given, **options), _row)
@@ -214,7 +214,7 @@ def test_weights_that_leave_all_numbers_are_a_divergence_in_both(robot, make, wh
     ],
     ids=["gamma", "plant", "solver", "rule", "greedy"],
 )
-def test_what_the_loop_does_not_know_takes_the_generator(robot, change):
+def test_parts_that_the_loop_does_not_know_take_the_generator(robot, change):
     changed = {"make": frozen, "nmpc": robot, "explore": noise(steps=3)} | change(robot)
     columns = assert_same(**changed, looped=False)
     assert len(columns["cost"]) == EPISODES * 3

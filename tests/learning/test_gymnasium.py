@@ -1,7 +1,5 @@
 """Gymnasium in both directions."""
 
-import subprocess
-import sys
 from itertools import pairwise
 
 import casadi as ca
@@ -131,8 +129,3 @@ def test_an_environment_of_ours_takes_an_agents_own_numbers_and_is_truncated_aft
         assert states[0].dtype == float
         found.append(states)
     np.testing.assert_array_equal(found, [found[0]] * 3)
-
-
-def test_gymnasium_is_imported_only_where_it_is_asked_for():
-    code = "import sys, nmpcrl.learning; sys.exit('gymnasium' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -106,7 +106,7 @@ def test_frozen_asks_for_nothing(controller, transition, weights):
     assert controller.calls == []
 
 
-def test_what_is_no_rule_and_a_bootstrap_that_does_not_fit_are_refused(
+def test_functions_for_rules_and_bootstraps_without_features_are_refused(
     controller, network, transition, weights
 ):
     with pytest.raises(ValueError, match=r"must be an UpdateRule: write UpdateRule\(step\)"):
@@ -126,7 +126,7 @@ def test_nothing_is_learned_from_an_episode_that_failed(controller, transition, 
         np.testing.assert_array_equal([after.theta, after.w], [before.theta, before.w])
 
 
-def test_a_rule_of_ones_own_has_a_memory_and_is_told_of_an_episode_that_failed(
+def test_a_rule_of_the_user_has_a_memory_and_hears_of_failed_episodes(
     controller, transition, weights
 ):
     """Momentum that forgets its velocity; theta stays within the learner's bounds."""

@@ -45,7 +45,7 @@ def transition(state, exploration, **more):
 
 
 def pairs(count=30):
-    """Exploration of both signs in every state: what is even in it drops out of the critic."""
+    """Exploration of both signs in every state: even terms drop out of the critic."""
     states = np.random.default_rng(1).normal(size=(count, 2))
     steps = [transition(s, sign * np.array([E])) for s in states for sign in (1, -1)]
     return [*steps[:-1], replace(steps[-1], last=True)]

@@ -1,4 +1,4 @@
-"""Remedies: by hand, on the two-state chain, and equal to what they mend where they do not bind."""
+"""Remedies: by hand, on the two-state chain, and beside the learners that they mend."""
 
 from dataclasses import replace
 from unittest.mock import Mock
@@ -100,7 +100,7 @@ def test_the_control_goes_as_far_as_the_remedy_in_the_direction_of_es(
 
 @pytest.mark.parametrize("wrap", [guarded, directed])
 @pytest.mark.parametrize("make", [lstd_q, lambda c: averaged(expected_sarsa(c, 0.1))])
-def test_what_needs_a_step_size_refuses_a_memory(controller, wrap, make):
+def test_remedies_that_need_a_step_size_refuse_a_memory(controller, wrap, make):
     with pytest.raises(ValueError, match=r"a rule that moves theta at every step; .* has a memory"):
         wrap(make(controller), 0.1)
 
@@ -152,7 +152,7 @@ def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition,
     )
 
 
-def test_what_is_undone_or_averaged_stays_within_the_bounds(controller, transition, weights):
+def test_undone_and_averaged_theta_stays_within_the_bounds(controller, transition, weights):
     judge, bounds = Mock(side_effect=[2.0, 1.0]), (np.full(3, -1.5), np.ones(3))
     base = replace(expected_sarsa(controller, 1.0), bounds=bounds)
     one = replace(transition(weights.theta, cost=50.0), last=True)

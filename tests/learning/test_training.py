@@ -1,4 +1,4 @@
-"""Algorithm 1 as a generator, what a failed solve means, and the rollout without noise."""
+"""Algorithm 1 as a generator, failed solves, and the rollout without noise."""
 
 from dataclasses import replace
 
@@ -81,10 +81,10 @@ def test_where_actions_are_valued_the_solution_has_the_applied_action_first(robo
         theta = step.weights.theta
 
 
-def test_a_learner_of_action_values_gets_them_unless_told_otherwise(robot):
+def test_a_learner_of_action_values_gets_them_unless_constrained_is_false(robot):
     learner = q_learning(robot, paper.ALPHA)
-    for told, valued in (({}, True), ({"constrained": False}, False)):
-        steps = run(learner, robot, noise(1, 3), **told)
+    for options, valued in (({}, True), ({"constrained": False}, False)):
+        steps = run(learner, robot, noise(1, 3), **options)
         assert [step.solution is not step.plan for step in steps] == [valued] * 3
 
 
@@ -105,7 +105,7 @@ def call(robot, **options):
         (lambda nmpc: call(nmpc, controller=5), "controller = 5 must be an Nmpc"),
     ],
 )
-def test_what_cannot_be_trained_is_refused_at_the_call(robot, refused, message):
+def test_arguments_that_cannot_be_trained_are_refused_at_the_call(robot, refused, message):
     with pytest.raises(ValueError, match=message):
         refused(robot)
 
@@ -145,16 +145,16 @@ def test_noise_is_standard_normal_and_shrinks_by_the_rate_each_count(robot, deca
 
 @pytest.mark.parametrize("failing", [2, 3])  # the plan at t = 1, or the second solve after it
 def test_a_solve_that_fails_ends_the_episode_and_learning_goes_on(failing):
-    told, controller = [], Faulty(lambda call: call == failing)
+    firsts, controller = [], Faulty(lambda call: call == failing)
 
     def step(theta, memory, transition, delta, successor):
-        told.append(transition.first)
+        firsts.append(transition.first)
         return theta, memory
 
     rule = UpdateRule(step, interrupted=lambda theta, memory: (1.01 * theta, memory))
     steps = run(replace(es(controller), rule=rule), controller, noise(2, 3))
     assert places(steps) == [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)]
-    assert told == [True, True, False, False]
+    assert firsts == [True, True, False, False]
     _, failed, begun, *_ = steps
     assert [f"call {failing} failed" in step.failure for step in steps] == [
         False,
@@ -218,7 +218,7 @@ def test_a_rollout_follows_the_plant_to_the_target_and_adds_up_its_costs(robot):
 
 
 @pytest.mark.parametrize("first", [0, 3])  # call that fails
-def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_had(first):
+def test_a_rollout_that_fails_costs_infinity_and_keeps_its_steps(first):
     failed = evaluate(Faulty(lambda call: call >= first), THETA, 10)
     assert (failed.states.shape, failed.actions.shape) == ((first, 3), (first, 2))
     assert failed.cost == np.inf
