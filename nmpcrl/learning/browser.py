@@ -11,7 +11,7 @@ LEARN = '''"""What is called to learn: `loop` on pointers, as in `entries`."""
 import numpy as np
 from numba import carray, float32, float64, int32, int64, njit, types, uint64
 
-from .dense import at_addresses, fit, follow, predict, remember
+from .dense import fit, follow, predict, remember
 from .entries import COLD, address, lengths, unpacked
 from .find import find
 from .loop import COUNT, copy, episode, move, plain, start_in
@@ -54,8 +54,12 @@ def learn(
     next_input = NX  # where u_1 is: behind x_0, u_0, the slacks of a stage, and x_1
     if N > 1:
         next_input = NX + NU + (z - N * NU) // (N + 1)
-    net = at_addresses(
-        weights, examples, order, counts, draw, scales, rate, sizes, inputs, capacity
+    hidden = sizes[0]
+    count = (inputs + hidden + 3) * hidden + 1
+    net = (
+        carray(weights, (4, count)), carray(examples, (capacity, inputs + 1)),
+        carray(order, capacity), carray(counts, 2), carray(draw, 1), carray(scales, inputs + 1),
+        rate, carray(sizes, 4),
     )
     state_, warm_, start = carray(state, NX), carray(warm, 2 * z + lam), COLD
     if not cold:

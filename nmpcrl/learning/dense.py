@@ -21,7 +21,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import carray, float32, float64, int32, int64, njit, types, uint64, void
+from numba import float32, float64, int32, int64, njit, types, uint64, void
 
 fast = {"contract", "arcp", "nsz", "reassoc", "afn"}
 options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
@@ -266,14 +266,3 @@ ENTRIES = (
     (predict, void(NET, matrix, float64[::1])),
     (follow, void(NET, NET, int64, float64)),
 )
-
-
-@inlined
-def at_addresses(weights, examples, order, counts, draw, scales, rate, sizes, inputs, capacity):
-    """A network whose arrays a host of WebAssembly put at these addresses."""
-    count = (inputs + sizes[0] + 3) * sizes[0] + 1
-    return (
-        carray(weights, (4, count)), carray(examples, (capacity, inputs + 1)),
-        carray(order, capacity), carray(counts, 2), carray(draw, 1), carray(scales, inputs + 1),
-        rate, carray(sizes, 4),
-    )  # fmt: skip

@@ -35,16 +35,6 @@ class CriticMeans(NamedTuple):
     fisher: Matrix  # (dpi / dtheta)' dpi / dtheta
 
 
-def critic_statistics(
-    phi: Vector, phi_next: Vector, psi: Vector, cost: float, gamma: float
-) -> Statistics:
-    """What one step adds to the first five of `CriticMeans`."""
-    change = gamma * phi_next - phi
-    return (
-        np.outer(phi, -change), phi * cost, np.outer(psi, psi), psi * cost, np.outer(psi, change),
-    )  # fmt: skip
-
-
 def ridge(A: Matrix, b: Vector, regularisation: float) -> Vector:
     """The x that is least in ||A x - b||^2 + regularisation ||x||^2."""
     found: Any = np.linalg.solve(A.T @ A + regularisation * np.eye(b.size), A.T @ b)
@@ -67,7 +57,7 @@ def no_successor(transition: Transition, theta: Vector) -> NextValue:
     return NextValue(np.nan)
 
 
-def policy_statistics(nmpc: Controller, transition: Transition, _: float) -> Statistics:
+def policy_statistics(nmpc: Controller, transition: Transition, _: float) -> CriticMeans:
     """What one step adds to `CriticMeans`; ValueError where u_0 was fixed: that is no policy."""
     solution = transition.solution
     if solution.ocp.fixed_action.size:
@@ -78,8 +68,11 @@ def policy_statistics(nmpc: Controller, transition: Transition, _: float) -> Sta
     phi = monomials(transition.state)
     phi_next = np.zeros_like(phi) if transition.end else monomials(transition.next_state)
     psi = jacobian.T @ (transition.action - solution.action)
-    own = critic_statistics(phi, phi_next, psi, transition.cost, nmpc.gamma)
-    return (*own, jacobian.T @ jacobian)
+    change, cost = nmpc.gamma * phi_next - phi, transition.cost
+    return CriticMeans(
+        np.outer(phi, -change), phi * cost, np.outer(psi, psi), psi * cost, np.outer(psi, change),
+        jacobian.T @ jacobian,
+    )  # fmt: skip
 
 
 def policy_gradient_estimate(regularisation: float, *found: Any) -> Statistics:

@@ -158,7 +158,7 @@ def train(
 
 
 class Trainer:
-    """Algorithm 1 with the arguments of `train`, which are checked."""
+    """Algorithm 1 with the arguments of `train`, checked."""
 
     def __init__(
         self,
@@ -200,7 +200,7 @@ class Trainer:
         self.plant = plant if isinstance(plant, Plant) else None  # the environment, if it is one
 
     def run(self, episode: Callable[[int, Weights], Iterator[Any]]) -> Iterator[Any]:
-        """What `episode` makes of each episode's number and first weights, one after another."""
+        """All results of `episode`, a function of an episode's number and first weights."""
         weights, failed = self.weights, 0
         for number in range(len(self.explore.scale)):
             failure = ""
@@ -275,6 +275,7 @@ def absurd(weights: Weights, largest: float = ABSURD) -> str:
     `largest` is that of the `Nmpc`; its default is that of every task's.
     """
     for name, vector in (("theta", weights.theta), ("w", weights.w)):
-        if not all(abs(number) <= largest for number in vector.tolist()):
+        small = sum(map(abs, vector.tolist())) <= largest  # false for nan, and faster than NumPy
+        if not small and not (np.abs(vector) <= largest).all():
             return f"{name} = {short(vector)}"
     return ""

@@ -11,7 +11,6 @@ from scipy.linalg import solve_discrete_lyapunov
 from nmpcrl.learning import Transition, Weights, policy_gradient
 from nmpcrl.learning.policy_gradient import (
     CriticMeans,
-    critic_statistics,
     lstd_advantage,
     lstd_value,
     monomials,
@@ -104,11 +103,15 @@ def test_the_gradient_is_that_of_mpcrl():
     Phi, Psi = np.array([monomials(s) for s in states]), (jacobian @ noise)[..., 0]
     v = lstd_dpg._compute_cafa_weight_v.py_func(Phi, costs, GAMMA, rho)
     w = lstd_dpg._compute_cafa_weight_w.py_func(Phi, Psi, costs, v, GAMMA, rho)
-    rows = zip(Phi[:-1], Phi[1:], Psi, costs, strict=True)
-    statistics = [critic_statistics(*row, GAMMA) for row in rows]
+    nmpc = SimpleNamespace(gamma=GAMMA, policy_jacobian=lambda solution: solution.jacobian)
+    free, statistics = SimpleNamespace(fixed_action=np.zeros(0)), []
+    for k in range(count):
+        solution = SimpleNamespace(action=np.zeros(1), jacobian=jacobian[k].T, ocp=free)
+        step = Transition(states[k], noise[k, 0], costs[k], states[k + 1], solution)
+        statistics.append(policy_statistics(nmpc, step, 0.0))
     sums = [np.sum(column, axis=0) for column in zip(*statistics, strict=True)]
-    fisher = (jacobian @ jacobian.transpose(0, 2, 1)).sum(0)
-    found, _ = policy_gradient_estimate(rho, *sums, fisher)
+    found, fisher = policy_gradient_estimate(rho, *sums)
+    np.testing.assert_allclose(fisher, (jacobian @ jacobian.transpose(0, 2, 1)).sum(0))
     np.testing.assert_allclose(found, fisher @ w, rtol=1e-8)
 
 
