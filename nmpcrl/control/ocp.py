@@ -58,12 +58,12 @@ class Ocp:
 
     @property
     def tie(self) -> float:
-        """The excess, in parts of a row's size, from which a row of stage 0 is violated."""
+        """A row of stage 0 is violated where it is larger, in parts of its size."""
         return -TIE if self.ties_active else TIE
 
     @cached_property
     def sizes(self) -> tuple[Vector, Vector]:
-        """The units of z and g: `Problem.typical_row_sizes` for slacks and rows, else 1."""
+        """The units of z and g, which are `Problem.typical_row_sizes` for slacks and rows."""
         z, g = np.ones(self.lower.size), np.ones(self.equality.size)
         soft, sizes = self.problem.soft, self.problem.typical_row_sizes
         z[self.slacks] = g[self.obstacles] = sizes[soft]

@@ -152,9 +152,12 @@ class Problem(Described):
         )
         self._take_theta(theta)
         rows = {**_rows("soft", soft, Soft), **_rows("hard", hard, Hard)}
-        family = _family(rows, data or {})
+        named = {one.each for one in rows.values() if one.each is not None}
+        if len(named) > 1 or not named <= {*(data or {})}:
+            raise ValueError(f"each = {sorted(named)} must name one table in data")
+        family = next(iter(named), None)
         self._take_data(data or {}, family)
-        self._write(model, stage, terminal, initial, rows, family)
+        self._write((model, stage, terminal, initial), rows, family)
         self.sizes = _sizes(scale, self)
 
     def _take_theta(self, theta: Mapping[str, Any]) -> None:
@@ -194,10 +197,7 @@ class Problem(Described):
 
     def _write(
         self,
-        model: Callable[..., Any],
-        stage: Callable[..., Any],
-        terminal: Callable[..., Any] | None,
-        initial: Callable[..., Any] | None,
+        functions: tuple[Callable[..., Any] | None, ...],
         rows: Rows,
         family: str | None,
     ) -> None:
@@ -213,6 +213,7 @@ class Problem(Described):
         arguments = {"x": x, "u": u, "theta": theta, "d": d}
         both, alone = ((x, u, *last), arguments), ((x, *last), {**arguments, "u": None})
         of_line = ((x, u, th, in_line), {**arguments, "line": line})
+        model, stage, terminal, initial = functions
         next_x = expression("model", model, *both, self.states, "state")
         cost = expression("stage", stage, *both, 1, "cost")
         final = expression("terminal", terminal, *alone, 1, "cost")
@@ -313,7 +314,7 @@ class Problem(Described):
 
     @cached_property
     def solved(self) -> "Problem":
-        """The problem that is solved: states and inputs in units of `sizes`."""
+        """The problem that is solved, with states and inputs in units of `sizes`."""
         if all((size == 1).all() for size in self.sizes):
             return self
         (states, inputs), other = self.sizes, copy(self)
@@ -345,7 +346,7 @@ class Problem(Described):
 
     @cached_property
     def _known(self) -> Matrix:
-        """A writeable copy of the data: machine code refuses read-only arrays."""
+        """A writeable copy of the data, for machine code refuses read-only arrays."""
         return self.data.copy()
 
 
@@ -392,17 +393,6 @@ def _rows(name: str, given: Any, kind: Any) -> Rows:
                 f"{place} = {one!r} must be a {kind.__name__}: write {name}=[{example}]"
             )
     return found
-
-
-def _family(rows: Rows, data: Mapping[str, Any]) -> str | None:
-    """The table that `Soft.each` names."""
-    for name, one in rows.items():
-        if one.each is not None and one.each not in data:
-            raise ValueError(f"{name}.each = {one.each!r} must be the name of data")
-    names = {one.each for one in rows.values() if one.each is not None}
-    if len(names) > 1:
-        raise ValueError(f"only one of the data may have rows of its lines, not {sorted(names)}")
-    return next(iter(names), None)
 
 
 def _stages(name: str, asked: Any, last: int, *, on_inputs: bool) -> NDArray[np.bool_]:

@@ -91,7 +91,10 @@ def problem(**changes) -> Problem:
         ({"hard": [Hard(lambda x, u, th: u, stages=[3])]}, r"hard\[0\] depends on u, and there"),
         ({"state_lower": 1, "state_upper": 0}, r"state_lower = .* must lie below state_upper"),
         ({"state_upper": [1, 2, 3]}, r"state_upper = .* must hold 2 numbers, one a state"),
-        ({"soft": Soft(lambda x, u, th: x, each="discs")}, r"soft\[0\].each = 'discs' must be the"),
+        (
+            {"soft": Soft(lambda x, u, th: x, each="discs")},
+            r"each = .'discs'. must name one table in data",
+        ),
         (
             {"soft": Soft(lambda x, u, th, d: x, each="at"), "data": {"at": [1.0]}, **WITH_DATA},
             "data 'at' must be a table",
