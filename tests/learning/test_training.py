@@ -71,21 +71,19 @@ def test_an_action_that_is_not_clipped_is_the_wish_and_frozen_weights_never_move
     assert any((np.abs(step.action) > robot.plant.upper).any() for step in steps)
 
 
-def test_where_actions_are_valued_the_solution_has_the_applied_action_first(robot):
-    theta = THETA
-    for step in run(es(robot), robot, noise(2, 5), constrained=True):
+@pytest.mark.parametrize(
+    ("make", "options"), [(expected_sarsa, {"constrained": True}), (q_learning, {})]
+)
+def test_where_actions_are_valued_the_solution_has_the_applied_action_first(robot, make, options):
+    theta, learner = THETA, make(robot, paper.ALPHA)
+    for step in run(learner, robot, noise(2, 5), **options):
         np.testing.assert_allclose(step.solution.action, step.action, atol=1e-12)
         fixed, free = (robot.solve(step.state, theta, None, a) for a in (step.action, None))
         assert step.solution.value == pytest.approx(fixed.value, rel=1e-6)
         assert step.plan.value == pytest.approx(free.value, rel=1e-6)
         theta = step.weights.theta
-
-
-def test_a_learner_of_action_values_gets_them_unless_constrained_is_false(robot):
-    learner = q_learning(robot, paper.ALPHA)
-    for options, valued in (({}, True), ({"constrained": False}, False)):
-        steps = run(learner, robot, noise(1, 3), **options)
-        assert [step.solution is not step.plan for step in steps] == [valued] * 3
+    steps = run(learner, robot, noise(1, 3), constrained=False)
+    assert all(step.solution is step.plan for step in steps)
 
 
 def call(robot, **options):
