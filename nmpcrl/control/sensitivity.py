@@ -1,9 +1,9 @@
-"""How the value of Eq. (2) answers to theta: the gradient is free, the Hessian a linear solve.
+"""Derivatives of the value of Eq. (2) in theta, by dense algebra.
 
 With the Lagrangian L(z, lam, nu; p) = f + lam' g + nu' z of Eq. (2), the envelope theorem says that
-the derivative of the optimal value is the *partial* derivative of L: how z moves does not matter to
-first order (Fiacco 1983; Gros and Zanon 2020). How z moves does matter to second order, and the
-implicit function theorem on the KKT conditions supplies it.
+the derivative of the optimal value is the *partial* derivative of L: to first order the change of z
+does not matter (Fiacco 1983; Gros and Zanon 2020). To second order it does, and the implicit
+function theorem on the KKT conditions supplies it.
 
 Where more rows and bounds are active than the inputs can follow, the plan has a kink. The value's
 gradient then lies between those of the two sides, and every other derivative is that of one side:
@@ -23,10 +23,10 @@ from scipy.optimize import linprog
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.ocp import Ocp
 
-DEPENDENT = 1e-9  # of the largest: less is left of an active gradient beside the others
-INACTIVE = 1e-6  # of itself: less is left of a multiplier on the side that is taken
-PULLED = 1e-6  # of the largest pull of a parameter: more of it is left where no step answers it
-STIFF, FLAT = 1e6, 1e-8  # an active row and no curvature, in parts of the largest curvature
+DEPENDENT = 1e-9  # least independent part of an active gradient, relative to the largest
+INACTIVE = 1e-6  # part of itself to which a multiplier falls that is 0 on the side taken
+PULLED = 1e-6  # largest residual of a linear system, relative to its right-hand side
+STIFF, FLAT = 1e6, 1e-8  # spring of an active row, and no curvature, relative to the largest
 
 Flags = NDArray[np.bool_]
 
@@ -69,8 +69,7 @@ class Sensitivity:
                 has no curvature.
         """
         l_tt, right, moved = self._moved(z, p, lam, nu)
-        result: Matrix = l_tt - right.T @ moved
-        return result
+        return np.asarray(l_tt - right.T @ moved)
 
     def plan(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> Matrix:
         """dz/dtheta, shape (size of z, d): as `hessian`, and as it raises."""
@@ -112,18 +111,13 @@ class Sensitivity:
         By the Riccati recursion, in which active rows and bounds are springs; true where no
         curvature can be had.
         """
-        ocp, N = self._ocp, len(self._ocp.inputs)
-        g, bends, end, *others = self._stages(z, p, lam)
-        size = float(ca.fmax(ca.norm_inf(ca.vec(bends)), ca.norm_inf(ca.vec(end))))
-        if not 0 < size < np.inf:
-            return bool(size)  # inf: true
-        active, bounds = self._active(z, g.full().ravel(), lam, nu)
-        rows = np.hstack([active[ocp.obstacles] & bounds[ocp.slacks], active[ocp.hard]])
-        bounds[ocp.inputs[: int(ocp.fixed_action.size > 0)]] = True
-        springs = STIFF * size * np.hstack([bounds[ocp.inputs], bounds[ocp.states[:N]], rows[:N]])
-        final = STIFF * size * np.append(bounds[ocp.states[N]], rows[N])
-        least = self._recursion(bends, end, *others, springs[::-1].T, final)
-        return bool(least > FLAT * size)
+        ocp = self._ocp
+        g, _ = self._conditions(z, p, lam)
+        active, bound = self._active(z, g.full().ravel(), lam, nu)
+        active[ocp.obstacles] &= bound[ocp.slacks]
+        bound[ocp.inputs[: int(ocp.fixed_action.size > 0)]] = True
+        least, size = map(float, self._pivots(z, p, lam, bound, active))
+        return least > FLAT * size if 0 < size < np.inf else bool(size)  # inf: true
 
     def kkt_residual(
         self, z: Vector, p: Vector, lam: Vector, nu: Vector, *, relative: bool = False
@@ -177,52 +171,29 @@ class Sensitivity:
         return ca.Function("second_derivatives", self._arguments, blocks)
 
     @cached_property
-    def _stages(self) -> ca.Function:
-        """g, L'' in (u, x) and the slopes of dynamics and rows; the last stages first.
-
-        What belongs to stage N, which has no input, follows what belongs to the others.
-        """
+    def _pivots(self) -> ca.Function:
+        """The least pivot of any stage's Q_uu, with springs, and the largest curvature without."""
         ocp, N = self._ocp, len(self._ocp.inputs)
-        bends = ca.jacobian(ca.gradient(self._lagrangian, ocp.variables), ocp.variables)
-        slopes = ca.jacobian(ocp.constraints, ocp.variables)
-        y = [[*ocp.inputs[i].tolist(), *ocp.states[i].tolist()] for i in range(N)]
+        slope = ca.gradient(self._lagrangian, ocp.variables)
+        bends, slopes = (ca.jacobian(f, ocp.variables) for f in (slope, ocp.constraints))
+        bound, active = ca.SX.sym("bound", ocp.lower.size), ca.SX.sym("active", ocp.equality.size)
+        y = [np.append(u, x).tolist() for u, x in zip(ocp.inputs, ocp.states, strict=False)]
         y.append(ocp.states[N].tolist())
-        rows = np.hstack([ocp.obstacles, ocp.hard]).tolist()
-        to = ocp.dynamics.tolist()
-        back = range(N - 1, -1, -1)
-        blocks = [
-            ca.horzcat(*(bends[y[i], y[i]] for i in back)),
-            bends[y[N], y[N]],
-            ca.horzcat(*(-slopes[to[i], y[i]] for i in back)),
-            ca.horzcat(*(slopes[rows[i], y[i]] for i in back)),
-            slopes[rows[N], y[N]],
-        ]
-        dense = [ocp.constraints, *map(ca.densify, blocks)]
-        return ca.Function("stages", self._arguments, dense)
-
-    @cached_property
-    def _recursion(self) -> ca.Function:
-        """The least pivot of any stage's Q_uu, from `_stages` and the stiffness of the springs."""
-        ocp, N = self._ocp, len(self._ocp.inputs)
-        n, m = ocp.states.shape[1], ocp.inputs.shape[1]
-        M = ocp.slacks.shape[1] + ocp.hard.shape[1]
-        V, H = ca.SX.sym("V", n, n), ca.SX.sym("H", m + n, m + n)
-        F, C, k = (ca.SX.sym("F", n, m + n), ca.SX.sym("C", M, m + n), ca.SX.sym("k", m + n + M))
-        K = H + F.T @ V @ F + C.T @ ca.diag(k[m + n :]) @ C + ca.diag(k[: m + n])
-        least = ca.SX(ca.inf)
-        for _ in range(m):  # eliminate an input
-            least = ca.fmin(least, K[0, 0])
-            K = K[1:, 1:] - K[1:, 0] @ K[0, 1:] / K[0, 0]
-        stage = ca.Function("stage", [V, H, F, C, k], [K, least])
-        each = stage.mapaccum("recursion", N)
-        ends = ca.MX.sym("end", n, n), ca.MX.sym("Cn", M, n), ca.MX.sym("kn", n + M)
-        along = [ca.MX.sym(name, *each.size_in(i)) for i, name in enumerate("HFCk", 1)]
-        last, rows, springs = ends
-        start = last + rows.T @ ca.diag(springs[n:]) @ rows + ca.diag(springs[:n])
-        _, pivots = each(start, *along)
-        bends, dynamics, held, stiff = along
-        arguments = [bends, last, dynamics, held, rows, stiff, springs]
-        return ca.Function("least", arguments, [ca.mmin(pivots)])
+        size = ca.norm_inf(ca.veccat(*(bends[k, k] for k in y)))
+        least, V = ca.SX(ca.inf), ca.SX(0, 0)
+        for i in range(N, -1, -1):
+            rows = [*ocp.obstacles[i].tolist(), *ocp.hard[i].tolist()]
+            C = slopes[rows, y[i]]
+            springs = ca.diag(bound[y[i]]) + C.T @ ca.diag(active[rows]) @ C
+            K = ca.densify(bends[y[i], y[i]]) + STIFF * size * springs
+            if i < N:
+                F = slopes[ocp.dynamics[i].tolist(), y[i]]
+                K += F.T @ V @ F
+                for _ in ocp.inputs[i]:  # eliminate an input
+                    least = ca.fmin(least, K[0, 0])
+                    K = K[1:, 1:] - K[1:, 0] @ K[0, 1:] / K[0, 0]
+            V = K
+        return ca.Function("pivots", [*self._arguments, bound, active], [least, size])
 
 
 def _dependent(active: Matrix) -> bool:
@@ -269,14 +240,9 @@ def _solved(kkt: Matrix, right: Matrix) -> Matrix:
         numpy.linalg.LinAlgError: a parameter pulls at one.
     """
     enough = PULLED * np.abs(right).max(initial=0.0)
-    for solve in (np.linalg.solve, _least):
+    for solve in (np.linalg.solve, lambda K, b: np.linalg.lstsq(K, b, rcond=DEPENDENT)[0]):
         with suppress(np.linalg.LinAlgError):
             result: Matrix = np.asarray(solve(kkt, right), float)
             if np.abs(kkt @ result - right).max(initial=0.0) <= enough:
                 return result
     raise np.linalg.LinAlgError("the optimum has no curvature where a parameter pulls at it")
-
-
-def _least(kkt: Matrix, right: Matrix) -> Matrix:
-    """The least of the steps that solve the system as nearly as any."""
-    return np.asarray(np.linalg.lstsq(kkt, right, rcond=DEPENDENT)[0], float)
