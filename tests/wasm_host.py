@@ -118,7 +118,6 @@ class Controller:
         self.module, self.nmpc = module, nmpc
         self.n, self.m, self.d = (problem[name] for name in ("states", "inputs", "theta"))
         self._units = {"state": problem["units"], "action": problem["input_units"]}
-        self._units |= {"states": self._units["state"], "inputs": self._units["action"]}
         N, rows = len(problem["discount"]) - 1, len(problem["weights"])
         slacks = rows - problem["fixed"] + problem["soft"]
         z, lam = (N + 1) * (self.n + slacks) + N * self.m, (N + 1) * (self.n + rows)
@@ -128,7 +127,7 @@ class Controller:
         shapes = {
             "state": self.n, "theta": self.d, "action": self.m, "warm": self._sizes[1],
             "out": self._sizes[1] + self.d, "report": 5, "next": self.n, "vector": self.d,
-            "states": (N + 1, self.n), "inputs": (N, self.m), "slope": self.d,
+            "weights": self.m, "slope": self.d,
         }  # fmt: skip
         self._zeros = {name: np.zeros(shape) for name, shape in shapes.items()}
         self._at = {"problem": module.put(browser.packed(problem))}
@@ -142,8 +141,8 @@ class Controller:
             array = self._zeros[one] if array is None else array
             if one in ("state", "action"):
                 array = array / np.array(self._units[one])
-            elif one in ("states", "inputs"):
-                array = array * np.array(self._units[one])
+            elif one == "weights":
+                array = array * np.array(self._units["action"])
             self.module.write(self._at[one], np.ravel(array))
         return self.module(name, *(self._at.get(one, one) for one in ("problem", *arguments)))
 
@@ -174,21 +173,13 @@ class Controller:
             "features": found[-self.d :],
         }
 
-    def slopes(self, state, theta, solution, vector=None, states=None, inputs=None, action=None):
-        """`Nmpc.value_hessian_times` plus the gradient of a weighted plan, or None."""
-        given = (
-            "state",
-            "theta",
-            "action",
-            solution["fixed"],
-            "warm",
-            "vector",
-            "states",
-            "inputs",
-        )
+    def slopes(self, state, theta, solution, vector=None, weights=None, action=None):
+        """`Nmpc.value_hessian_times` plus the gradient of a weighted sum of u_0, or None."""
+        given = ("state", "theta", "action", solution["fixed"], "warm", "vector", "weights")
         numbers = {"state": state, "theta": theta, "action": action, "warm": solution["numbers"]}
-        weights = {"vector": vector, "states": states, "inputs": inputs}
-        formed = self._call("nmpc_slopes", *given, "slope", **numbers, **weights)
+        formed = self._call(
+            "nmpc_slopes", *given, "slope", vector=vector, weights=weights, **numbers
+        )
         return self._read("slope", self.d) if formed else None
 
     def step(self, state, action, theta=None):

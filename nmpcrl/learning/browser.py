@@ -12,7 +12,7 @@ import numpy as np
 from numba import carray, float32, float64, int32, int64, njit, types, uint64
 
 from .dense import fit, follow, predict, remember
-from .entries import COLD, address, lengths, unpacked
+from .entries import COLD, address, places_in, unpacked
 from .find import find
 from .loop import COUNT, copy, episode, move, plain, start_in
 from .loop import td_error as error
@@ -49,11 +49,9 @@ def learn(
     the largest theta. `cold` says that an episode begins; `row` is one of `loop.episode`.
     """
     (given, others, drawn), (fixed, _, _) = unpacked(problem, 0), unpacked(problem, 1)
-    (z, lam), N = lengths(given, 0), len(given[5]) - 1
+    stage, _, place, _, size = places_in(given, 0)
     how = carray(learner, HOW + 2 * NTHETA)
-    next_input = NX  # where u_1 is: behind x_0, u_0, the slacks of a stage, and x_1
-    if N > 1:
-        next_input = NX + NU + (z - N * NU) // (N + 1)
+    next_input = NX + (stage if len(given[5]) > 2 else 0)  # where u_1 is, or u_0 if N is 1
     hidden = sizes[0]
     count = (inputs + hidden + 3) * hidden + 1
     net = (
@@ -61,12 +59,12 @@ def learn(
         carray(order, capacity), carray(counts, 2), carray(draw, 1), carray(scales, inputs + 1),
         rate, carray(sizes, 4),
     )
-    state_, warm_, start = carray(state, NX), carray(warm, 2 * z + lam), COLD
+    state_, warm_, start = carray(state, NX), carray(warm, size), COLD
     if not cold:
         start = start_in(state_, warm_)
     return steps(
         find, slopes, step, charge, remember, fit, predict, follow,
-        given, fixed, others, drawn, how[6], z + 2 * NX, next_input, how[7],
+        given, fixed, others, drawn, how[6], place, next_input, how[7],
         how[8], int(how[0]), how[1], how[2], how[HOW : HOW + NTHETA], how[HOW + NTHETA :],
         int(how[3]), net, net, (how[4] > 0, True, False, 1, 0, 0.0), how[5] > 0, True,
         start, 0, state_, carray(theta, NTHETA),

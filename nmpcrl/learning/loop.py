@@ -29,7 +29,7 @@ PROBLEM = (matrix, vector, vector, matrix, int64[:, ::1], vector, vector, float6
 FIND = types.UniTuple(float64, 6)(
     *PROBLEM, vector, vector, vector, int64, tensor, tensor, int64, float64, vector, vector
 )
-SLOPES = flag(*PROBLEM, vector, vector, vector, int64, vector, vector, matrix, matrix, vector)
+SLOPES = flag(*PROBLEM, vector, vector, vector, int64, vector, vector, vector, vector)
 FUNCTIONS = (
     FIND, SLOPES, void(given, given, vector), float64(given, given, given),
     *(signature for _, signature in ENTRIES),
@@ -92,15 +92,6 @@ def start_in(state, warm):
 
 
 @plain
-def carried(old, place, count, new):
-    """Copy a solution, with `count` more multipliers at `place`, or -`count` fewer."""
-    copy(old[:place], new)
-    for k in range(place, place + count):
-        new[k] = 0.0
-    copy(old[place + max(0, -count) :], new[place + max(0, count) :])
-
-
-@plain
 def move(rule, theta, w, delta, phi, phi_next, product, alpha, beta, gamma):
     """The next theta; w moves in place, and `product` is the Hessian times w."""
     if rule == SEMI_GRADIENT:
@@ -136,7 +127,7 @@ def imitated(remember, fit, predict, follow, net, target, imitation, example, va
 
 def no_slopes(
     data, lower, upper, sides, kind, discount, weights, tie,
-    state, theta, action, fixed, solved, w, of_states, of_inputs, out,
+    state, theta, action, fixed, solved, w, of_action, out,
 ):  # fmt: skip
     return False
 
@@ -177,11 +168,8 @@ def episode(
     """
     n, m, d, split = len(state), noise.shape[1], len(theta), len(warm)
     plan, successor, solution = np.empty(split + d), np.empty(split + d), np.empty(split)
-    now, point = np.empty(split + m + d), np.empty(split + m)
-    none, later, product = np.zeros(m), np.empty(n), np.empty(d)
-    discount = problem[5]
-    gamma, of_states = discount[1], np.zeros((len(discount), n))
-    of_inputs = np.zeros((len(discount) - 1, m))
+    now, none = np.empty(split + m + d), np.zeros(m)
+    later, product, gamma = np.empty(n), np.empty(d), problem[5][1]
     inputs = n + m + (d if imitation[0] else 0)
     for t in range(first, len(noise)):
         value, iterations, end, violation, _, restarts = find(
@@ -198,15 +186,16 @@ def episode(
             return t
         copy(plan[:split], solution)
         if constrained:
-            carried(solution, place, m, point)
             value, taken, end, beyond, _, failed = find(
-                *given_action, state, theta, action, 1, others, drawn, SAME, tolerance, point, now
-            )
+                *given_action, state, theta, action, 1, others, drawn, SAME, tolerance, solution,
+                now,
+            )  # fmt: skip
             if end != SOLVED or not value < ABSURD:
                 return t
             solves, iterations, restarts = 2, iterations + taken, restarts + failed
             violation, phi = max(violation, beyond), now[split + m :]
-            carried(now[: split + m], place, -m, solution)
+            copy(now[:place], solution)
+            copy(now[place + m : split + m], solution[place:])
         next_value = loss = np.nan
         if bootstrap == SECOND_SOLVE:
             begin = start_in(later, solution)
@@ -221,13 +210,10 @@ def episode(
         formed = True
         if rule == EXACT and constrained:
             formed = slopes(
-                *given_action, state, theta, action, 1, now[: split + m], w, of_states, of_inputs,
-                product,
-            )  # fmt: skip
-        elif rule == EXACT:
-            formed = slopes(
-                *problem, state, theta, none, 0, plan[:split], w, of_states, of_inputs, product
+                *given_action, state, theta, action, 1, now[: split + m], w, none, product
             )
+        elif rule == EXACT:
+            formed = slopes(*problem, state, theta, none, 0, plan[:split], w, none, product)
         if not formed:
             return t
         known = bootstrap == SECOND_SOLVE

@@ -175,7 +175,7 @@ def test_without_a_derivative_of_the_plan_dense_algebra_answers_in_both(monkeypa
     @njit(SLOPES)
     def slopes(
         data, lower, upper, sides, kind, discount, weights, tie,
-        state, theta, action, fixed, solved, w, of_states, of_inputs, out,
+        state, theta, action, fixed, solved, w, of_action, out,
     ):  # fmt: skip
         return False
 

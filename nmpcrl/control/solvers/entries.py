@@ -9,10 +9,10 @@ solved. A solution's numbers are z, lam and nu in the order of `Ocp`, and then t
 import numpy as np
 from numba import carray, float64, int32, njit, types
 
+from . import model
 from .find import find
-from .kernel import COLD, SAME, SHIFTED, SOLVED, allocating
-from .model import FIXED, NTHETA, NU, NX, OWN, PER, SOFT, WIDTH, transition
-from .model import stage_cost as cost_of_stage
+from .kernel import COLD, SAME, SHIFTED, SOLVED, allocating, places
+from .model import FIXED, NTHETA, NU, NX, OWN, PER, WIDTH
 from .slopes import slopes
 
 UNKNOWN = -1
@@ -53,28 +53,11 @@ def unpacked(problem, fixed):
 
 
 @allocating
-def lengths(given, fixed):
-    """Of z and of lam."""
+def places_in(given, fixed):
+    """`kernel.places` of a problem: last, the length of a solution without its gradient."""
     data, discount = given[0], given[5]
-    N, slacks = len(discount) - 1, SOFT
-    if WIDTH > 0:
-        slacks += PER * ((data.shape[1] - OWN) // WIDTH)
-    stage = NX + slacks
-    return (N + 1) * stage + N * NU, (N + 1) * (stage + FIXED - SOFT) + fixed * NU
-
-
-@allocating
-def carried(given, fixed, old_fixed, old):
-    """The numbers of a solution as those of the same problem with u_0 fixed or free instead."""
-    (z, lam), (_, old_lam) = lengths(given, fixed), lengths(given, old_fixed)
-    new, moved = np.zeros(2 * z + lam), (old_fixed - fixed) * NU
-    for k in range(z):
-        new[k] = old[k]
-        new[z + lam + k] = old[z + old_lam + k]
-    for k in range(lam):  # the rows of a given u_0 follow those of x_0
-        if k < 2 * NX or k >= 2 * NX + fixed * NU:
-            new[z + k] = old[z + k + (moved if k >= 2 * NX else 0)]
-    return new
+    lines = (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
+    return places(len(discount), lines, fixed)
 
 
 @njit(int32(*AT, int32, address, float64, address, address), error_model="numpy")
@@ -88,37 +71,34 @@ def nmpc_solve(
     violation of hard rows and the relative error. Returns the `End`, or -1 for an infinite value.
     """
     given, others, drawn = unpacked(problem, fixed)
-    z, lam = lengths(given, fixed)
+    size = places_in(given, fixed)[-1]
     state_, report_, begin = carray(state, NX), carray(report, 5), COLD
-    point = np.zeros(2 * z + lam)
+    point = np.zeros(size)
     if warm_fixed != UNKNOWN:
-        old = carray(warm_start, 2 * z + lengths(given, warm_fixed)[1])
-        point, begin = carried(given, fixed, warm_fixed, old), SAME
+        point, begin = carray(warm_start, places_in(given, warm_fixed)[-1]), SAME
         for a in range(NX):
-            if state_[a] != old[a]:
+            if state_[a] != point[a]:
                 begin = SHIFTED
     value, iterations, end, violation, error, failed = find(
         *given, state_, carray(theta, NTHETA), carray(action, NU), fixed,
-        others, drawn, begin, tolerance, point, carray(out, 2 * z + lam + NTHETA),
+        others, drawn, begin, tolerance, point, carray(out, size + NTHETA),
     )  # fmt: skip
     report_[0], report_[1], report_[2] = value, iterations, failed
     report_[3], report_[4] = violation, error
     return int(end) if end != SOLVED or value < np.inf else UNKNOWN
 
 
-@njit(int32(*AT, address, address, address, address, address), error_model="numpy")
-def nmpc_slopes(problem, state, theta, action, fixed, solution, vector, of_states, of_inputs, out):
-    """The Hessian of the value times a vector, plus the gradient of a weighted sum of the plan.
+@njit(int32(*AT, address, address, address, address), error_model="numpy")
+def nmpc_slopes(problem, state, theta, action, fixed, solution, vector, of_action, out):
+    """The Hessian of the value times a vector, plus the gradient of a weighted sum of u_0.
 
-    The weights are of shape (N + 1, NX) and (N, NU), the vector and `out` (NTHETA,). Returns 0 at
-    no strict minimum.
+    The weights are of shape (NU,), the vector and `out` (NTHETA,). Returns 0 at no strict minimum.
     """
     given, _, _ = unpacked(problem, fixed)
-    (z, lam), N = lengths(given, fixed), len(given[5]) - 1
     return slopes(
         *given, carray(state, NX), carray(theta, NTHETA), carray(action, NU), fixed,
-        carray(solution, 2 * z + lam), carray(vector, NTHETA),
-        carray(of_states, (N + 1, NX)), carray(of_inputs, (N, NU)), carray(out, NTHETA),
+        carray(solution, places_in(given, fixed)[-1]), carray(vector, NTHETA),
+        carray(of_action, NU), carray(out, NTHETA),
     )  # fmt: skip
 
 
@@ -126,7 +106,7 @@ def nmpc_slopes(problem, state, theta, action, fixed, solution, vector, of_state
 def model_step(problem, state, theta, action, out):
     """The state that the model predicts with the data of stage 0."""
     data = unpacked(problem, 0)[0][0]
-    transition(
+    model.transition(
         carray(state, NX), carray(action, NU), carray(theta, NTHETA), data[0], carray(out, NX)
     )
     return 0
@@ -136,7 +116,7 @@ def model_step(problem, state, theta, action, out):
 def stage_cost(problem, state, theta, action):
     """l of the problem with the data of stage 0, undiscounted."""
     data = unpacked(problem, 0)[0][0]
-    return cost_of_stage(carray(state, NX), carray(action, NU), carray(theta, NTHETA), data[0])
+    return model.stage_cost(carray(state, NX), carray(action, NU), carray(theta, NTHETA), data[0])
 
 
 EXPORTS = (nmpc_solve, nmpc_slopes, model_step, stage_cost)

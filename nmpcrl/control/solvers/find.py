@@ -3,9 +3,8 @@
 import numpy as np
 from numba import float64, int64, njit, types
 
-from .kernel import COLD, HELD, NEAR, PROBLEM, SAME, SOLVED, options, tensor, vector
+from .kernel import COLD, HELD, NEAR, PROBLEM, SAME, SOLVED, options, solve, tensor, vector
 from .model import NU
-from .solve import solve
 
 WARM_LIMIT = 40  # iterations from a warm start
 COLD_LIMIT = 300  # iterations from a cold one

@@ -2,21 +2,20 @@
 
 The inputs are the variables and the states follow from them (single shooting). Each constraint
 h(x, u) <= sigma of a stage is a *row*: with slack s = sigma - h it adds W sigma - mu log sigma - mu
-log s to the objective, and its multiplier lam lies in (0, W). A hard row, or a bound of a state, is
-one whose W exceeds what its multiplier can be, and is no part of the value.
+log s to the objective, and its multiplier lam lies in (0, W). A hard row, or a bound of a state,
+has a W that exceeds any multiplier, and is no part of the value.
 
-Arrays of rows hold those of all stages one after the other, of a stage fixed rows, those of lines
-of data, and sides of the states' box. A row of a stage is *planned* where the plan can change it,
-*settled* at stage 0 where it cannot, and else absent. All but planned ones stand in the barrier as
-h = -1 and change nothing.
+Arrays of rows hold all stages one after the other: fixed rows, rows of lines of data, and sides of
+the states' box. A row is *planned* where the plan can change it, *settled* at stage 0 where no plan
+can, and else absent. Rows that are not planned stand in the barrier as h = -1 and change nothing.
 
 From a start, one solve repeats the following while the barrier parameter mu falls:
 
 1. `measure` a plan: h, and for it the best sigma and s in closed form;
 2. `linearise`: from the last stage to the first, the costates p = L_x + A' p+ and the Hessian of
-   the Lagrangian with the curvature of the dynamics. Its costates are those that step 6 predicted
-   (`remember`), which p equals at a solution: p of an unstable model depends on its plan wildly;
-3. `residuals`: how far KKT is from holding; stop if hardly, let mu fall if little beside mu;
+   the Lagrangian, with the curvature of the dynamics. The Hessian has the costates that step 6
+   predicted (`remember`): p, their limit, depends wildly on the plan of an unstable model;
+3. `residuals`: the violation of KKT. Stop if it is small; let mu fall if it is small beside mu;
 4. `condense`: fold rows and bounds into the stages, one division each;
 5. `factorise`: the Riccati recursion. Where some Q_uu is not positive definite, delta I is added
    to all of them and the recursion repeated;
@@ -29,9 +28,9 @@ boundary and inertia, Wächter and Biegler (2006); stage-wise elimination, Friso
 the feedback, Tassa, Mansard and Todorov (2014); a start with defects, Giftthaler et al. (2018).
 
 numba compiles this file beside a `model` generated from CasADi expressions, whose sizes are
-constants there. Everything is inlined, and every buffer allocated in the function that is called:
-the compiler then knows all sizes. What allocates nothing is compiled without counting of references
-(`_nrt`), which takes a fifth of the time, and must not return an array.
+constants. Everything is inlined, and every buffer allocated in the function that is called: the
+compiler then knows all sizes. Functions that allocate nothing are compiled without counting of
+references (`_nrt`), which takes a fifth of the time, and must not return an array.
 """
 
 import math
@@ -40,40 +39,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, njit
 
+from . import model
 from .codes import End, Start
-from .model import (
-    FIXED,
-    NTHETA,
-    NU,
-    NX,
-    OWN,
-    PER,
-    SOFT,
-    WIDTH,
-    along_fixed,
-    along_line,
-    condense_fixed,
-    condense_line,
-    expand_fixed,
-    expand_line,
-    expand_stage,
-    expand_terminal,
-    fixed_rows,
-    fixed_sizes,
-    initial_cost,
-    initial_theta,
-    line_rows,
-    line_sizes,
-    stage_cost,
-    stage_size,
-    stage_theta,
-    terminal_cost,
-    terminal_size,
-    terminal_theta,
-    theta_fixed,
-    theta_line,
-    transition,
-)
+from .model import FIXED, NTHETA, NU, NX, OWN, PER, SOFT, WIDTH
 
 # numba takes plain numbers; a tuple below has one entry a start.
 COLD, SHIFTED, NEAR, SAME, HELD = map(int, Start)
@@ -112,6 +80,7 @@ ARMIJO = 1e-4  # eta_phi, the part of its predicted fall that the barrier functi
 
 LEAST_VALUE = 1e-4  # of the objective that the error is compared with, in largest multipliers
 POLISHED = 4  # iterations within the tolerance, after which rounding keeps the error above `goal`
+FLAT = 1e-6  # curvature of the scaled problem that counts as none
 INSIDE = 1e-12  # the part of W by which a multiplier starts inside (0, W)
 ROUNDING = 1e-14  # of the barrier function, relative
 ALMOST = 1.0 - 4e-16  # of W is the most for lam, or W - lam is rounded to 0
@@ -163,7 +132,7 @@ class Duals(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """Derivatives at an iterate, and their condensed form; what has u at stage N is not used."""
+    """Derivatives at an iterate, and their condensed form; parts with u are unused at stage N."""
 
     A: np.ndarray  # d x+ / d x, (N, NX, NX)
     B: np.ndarray  # d x+ / d u, (N, NX, NU)
@@ -174,7 +143,7 @@ class Stages(NamedTuple):
     px: np.ndarray  # of lam' h, (N + 1, NX)
     pu: np.ndarray  # (N + 1, NU)
     p: np.ndarray  # costates, (N + 1, NX)
-    gap: np.ndarray  # what a step adds to x_i besides A dx + B du: 0 along a plan, (N + 1, NX)
+    gap: np.ndarray  # added to dx_i by a step besides A dx + B du: 0 along a plan, (N + 1, NX)
     Q: np.ndarray  # Hessian of the Lagrangian, (N + 1, NX, NX)
     S: np.ndarray  # (N + 1, NU, NX)
     R: np.ndarray  # (N + 1, NU, NU)
@@ -212,16 +181,16 @@ class Step(NamedTuple):
 def roll(task, point):
     """The states that the inputs lead to from point.x[0]."""
     for i in range(len(point.u)):
-        transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
+        model.transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
 
 
 @inlined
 def measure(task, point, mu):
     """Step 1: the objective and the barrier function of a plan."""
     x, u, h, last = point.x, point.u, point.h, len(point.u)
-    objective = task.rate[last] * terminal_cost(x[last], task.theta, task.data[last])
+    objective = task.rate[last] * model.terminal_cost(x[last], task.theta, task.data[last])
     for i in range(last):
-        objective += task.rate[i] * stage_cost(x[i], u[i], task.theta, task.data[i])
+        objective += task.rate[i] * model.stage_cost(x[i], u[i], task.theta, task.data[i])
     for i in range(task.begin, last + 1):
         rows_of(task, x, u, i, h)
     for t in range(task.begin * task.rows, len(h)):
@@ -233,15 +202,9 @@ def measure(task, point, mu):
 @inlined
 def rows_of(task, x, u, i, h):
     """h of every row of a stage, planned or not."""
-    t, last = task.rows * i, len(u)
-    fixed_rows(x[i], u[min(i, last - 1)], task.theta, task.data[i], h, t)
-    t += FIXED
-    for line in range(task.lines):
-        line_rows(
-            x[i], u[min(i, last - 1)], task.theta, task.data[i], task.data[i], h,
-            OWN + WIDTH * line, t,
-        )  # fmt: skip
-        t += PER
+    t = task.rows * i
+    model.measure_rows(x[i], u[min(i, len(u) - 1)], task.theta, task.data[i], h, t, task.lines)
+    t += task.rows - len(task.sides)
     for j in range(len(task.sides)):
         h[t + j] = task.sides[j, 1] * (x[i, int(task.sides[j, 0])] - task.sides[j, 2])
 
@@ -264,7 +227,7 @@ def centre(task, point, mu):
 
 @inlined
 def barrier(task, point, mu):
-    """What the rows and the inputs' bounds add to the objective."""
+    """The terms of rows and of the inputs' bounds in the barrier function."""
     u, sigma, slack = point.u, point.sigma, point.slack
     total, logs, product = 0.0, 0.0, 1.0
     for t in range(task.begin * task.rows, len(sigma)):
@@ -285,7 +248,7 @@ def barrier(task, point, mu):
 def linearise(task, point, duals, stages, costates):
     """Step 2: derivatives of every stage, from the last to the first.
 
-    The Hessian is that of the Lagrangian with these costates, which may be `stages.p`.
+    The Lagrangian in the Hessian has the given costates, which may be `stages.p`.
     """
     x, u, p, last = point.x, point.u, stages.p, len(point.u)
     for t in range(task.begin * task.rows, len(point.h)):
@@ -293,14 +256,14 @@ def linearise(task, point, duals, stages, costates):
     clear(stages)
     for i in range(task.begin, last + 1):
         expand_rows(task, x, u, i, stages)
-    expand_terminal(
+    model.expand_terminal(
         x[last], task.theta, task.data[last], task.rate[last:], stages.lx[last], stages.Q[last]
     )
     for a in range(NX):
         p[last, a] = stages.lx[last, a] + stages.px[last, a]
         stages.px[0, a] = 0.0  # x_0 is given
     for i in range(last - 1, -1, -1):
-        expand_stage(
+        model.expand_stage(
             x[i], u[i], task.theta, task.data[i], task.rate[i:], costates[i + 1],
             stages.A[i], stages.B[i], stages.lx[i], stages.lu[i],
             stages.Q[i], stages.S[i], stages.R[i],
@@ -315,35 +278,22 @@ def linearise(task, point, duals, stages, costates):
 @inlined
 def clear(stages):
     """Zeros where the functions of `model` add."""
-    for i in range(len(stages.px)):
-        for a in range(NX):
-            stages.px[i, a] = 0.0
-            for b in range(NX):
-                stages.Q[i, a, b] = 0.0
-        for a in range(NU):
-            stages.pu[i, a] = 0.0
-            for b in range(NX):
-                stages.S[i, a, b] = 0.0
-            for b in range(NU):
-                stages.R[i, a, b] = 0.0
+    stages.px[:] = 0.0
+    stages.pu[:] = 0.0
+    stages.Q[:] = 0.0
+    stages.S[:] = 0.0
+    stages.R[:] = 0.0
 
 
 @inlined
 def expand_rows(task, x, u, i, stages):
-    """Gradients of a stage's rows, and what held' h adds to the Lagrangian's derivatives."""
-    t, last, held = task.rows * i, len(u), stages.held
-    expand_fixed(
-        x[i], u[min(i, last - 1)], task.theta, task.data[i], held, stages.hx, stages.hu,
-        stages.px[i], stages.pu[i], stages.Q[i], stages.S[i], stages.R[i], t,
+    """Gradients of a stage's rows, and the derivatives of held' h in the Lagrangian."""
+    t, held = task.rows * i, stages.held
+    model.expand_rows(
+        x[i], u[min(i, len(u) - 1)], task.theta, task.data[i], held, stages.hx, stages.hu,
+        stages.px[i], stages.pu[i], stages.Q[i], stages.S[i], stages.R[i], t, task.lines,
     )  # fmt: skip
-    t += FIXED
-    for line in range(task.lines):
-        expand_line(
-            x[i], u[min(i, last - 1)], task.theta, task.data[i], task.data[i], held,
-            stages.hx, stages.hu, stages.px[i], stages.pu[i],
-            stages.Q[i], stages.S[i], stages.R[i], OWN + WIDTH * line, t,
-        )  # fmt: skip
-        t += PER
+    t += task.rows - len(task.sides)
     for j in range(len(task.sides)):
         stages.px[i, int(task.sides[j, 0])] += held[t + j] * task.sides[j, 1]
 
@@ -352,7 +302,7 @@ def expand_rows(task, x, u, i, stages):
 def residuals(task, point, duals, stages, mu):
     """Step 3: Euclidean norms of KKT's violation, and the largest multiplier.
 
-    Stationarity is that of the inputs; the others' holds by construction. Complementarity is how
+    Stationarity concerns the inputs; it holds in the states by construction. Complementarity is how
     far the products of multipliers and distances are from mu.
     """
     largest, stationarity, complementarity = 1.0, 0.0, 0.0
@@ -388,28 +338,28 @@ def input_gradient(stages, i, a):
 def condense(task, point, duals, stages, mu):
     """Step 4: Newton's system without rows and bounds: q and r, and Q, S and R in place."""
     soften(task, point, duals, stages, mu)
-    q, r, Q, S, R, last = stages.q, stages.r, stages.Q, stages.S, stages.R, len(point.u)
+    last = len(point.u)
     for i in range(task.first, last):
         for a in range(NU):
             low, high = 1.0 / (point.u[i, a] - task.lower[a]), 1.0 / (task.upper[a] - point.u[i, a])
             stages.lu[i, a] += mu * high - mu * low
-            R[i, a, a] += duals.below[i, a] * low + duals.above[i, a] * high
+            stages.R[i, a, a] += duals.below[i, a] * low + duals.above[i, a] * high
     begin_sides(stages)
     for i in range(task.begin, last + 1):
-        t = task.rows * i
-        condense_fixed(
-            stages.firm, stages.pull, stages.hx, stages.hu, q[i], r[i], Q[i], S[i], R[i], t
-        )
-        t += FIXED
-        for _ in range(task.lines):
-            condense_line(
-                stages.firm, stages.pull, stages.hx, stages.hu, q[i], r[i], Q[i], S[i], R[i], t
-            )
-            t += PER
-        for j in range(len(task.sides)):
-            a = int(task.sides[j, 0])
-            q[i, a] += stages.pull[t + j] * task.sides[j, 1]
-            Q[i, a, a] += stages.firm[t + j]
+        fold(task, stages, i)
+
+
+@inlined
+def fold(task, stages, i):
+    """Add pull' h of a stage's rows to q and r, and what is firm to the Hessian."""
+    q, r, Q, S, R = stages.q[i], stages.r[i], stages.Q[i], stages.S[i], stages.R[i]
+    firm, pull, t = stages.firm, stages.pull, task.rows * i
+    model.condense_rows(firm, pull, stages.hx, stages.hu, q, r, Q, S, R, t, task.lines)
+    t += task.rows - len(task.sides)
+    for j in range(len(task.sides)):
+        a = int(task.sides[j, 0])
+        q[a] += pull[t + j] * task.sides[j, 1]
+        Q[a, a] += firm[t + j]
 
 
 @inlined
@@ -535,6 +485,15 @@ def feedback(L, F, f, K, k):
 
 
 @inlined
+def regularise(stages, first, step, least):
+    """`factorise` with the first delta that will do: 0, or else from `least` on."""
+    delta = 0.0
+    while not factorise(stages, delta, first, step) and delta < DELTA_LARGEST:
+        delta = DELTA_GROWS * delta if delta > 0.0 else least
+    return delta
+
+
+@inlined
 def convex(stages, first, step, size):
     """`factorise` an LQ problem; where it is not convex, delta I is added to its Q and R."""
     added = 0.0
@@ -552,8 +511,8 @@ def convex(stages, first, step, size):
 def regulate(task, plan, stages, step, point):
     """Inputs for a model that falls over at rest: the plan of one LQ problem, held by its feedback.
 
-    The problem is linearised where every stage stands still at s. That is no plan, so its sweep
-    closes the defects f(s, u) - s; the model is then rolled out under u + k + K (x - s).
+    The problem is linearised with every stage at s, where the defects f(s, u) - s are gaps that the
+    step closes; the model is then rolled out under u + k + K (x - s).
     """
     x, u, gap, last, size = plan.x, plan.u, stages.gap, len(plan.u), 0.0
     clear(stages)
@@ -563,16 +522,16 @@ def regulate(task, plan, stages, step, point):
             stages.p[i, a] = 0.0
         for a in range(NU if i < last else 0):
             u[i, a] = point.u[i, a]
-    expand_terminal(
+    model.expand_terminal(
         x[last], task.theta, task.data[last], task.rate[last:], stages.lx[last], stages.Q[last]
     )
     for i in range(last):
-        expand_stage(
+        model.expand_stage(
             x[i], u[i], task.theta, task.data[i], task.rate[i:], stages.p[i + 1],
             stages.A[i], stages.B[i], stages.lx[i], stages.lu[i],
             stages.Q[i], stages.S[i], stages.R[i],
         )  # fmt: skip
-        transition(x[i], u[i], task.theta, task.data[i], gap[i + 1])
+        model.transition(x[i], u[i], task.theta, task.data[i], gap[i + 1])
         for a in range(NX):
             gap[i + 1, a] -= x[i, a]
             size = max(size, abs(stages.Q[i, a, a]), abs(stages.Q[last, a, a]))
@@ -623,11 +582,9 @@ def rows_along(task, stages, step):
     last, dh = len(step.u), step.lam
     for i in range(task.begin, last + 1):
         t = task.rows * i
-        along_fixed(stages.hx, stages.hu, step.x[i], step.u[min(i, last - 1)], dh, t)
-        t += FIXED
-        for _ in range(task.lines):
-            along_line(stages.hx, stages.hu, step.x[i], step.u[min(i, last - 1)], dh, t)
-            t += PER
+        u = step.u[min(i, last - 1)]
+        model.along_rows(stages.hx, stages.hu, step.x[i], u, dh, t, task.lines)
+        t += task.rows - len(task.sides)
         for j in range(len(task.sides)):
             dh[t + j] = task.sides[j, 1] * step.x[i, int(task.sides[j, 0])]
     for t in range(task.begin * task.rows, len(dh)):
@@ -660,11 +617,8 @@ def bounds_along(task, point, duals, mu, step, tau):
             if i < task.first:
                 step.below[i, a] = step.above[i, a] = 0.0
                 continue
-            du, low, high = (
-                step.u[i, a],
-                point.u[i, a] - task.lower[a],
-                task.upper[a] - point.u[i, a],
-            )
+            du = step.u[i, a]
+            low, high = point.u[i, a] - task.lower[a], task.upper[a] - point.u[i, a]
             below, above = duals.below[i, a], duals.above[i, a]
             step.below[i, a] = (mu - below * du) / low - below
             step.above[i, a] = (mu + above * du) / high - above
@@ -705,12 +659,12 @@ def follow(task, plan, step, length, most, point):
                     move += step.K[i, a, b] * (point.x[i, b] - plan.x[i, b])
             low, high = plan.u[i, a] - task.lower[a], task.upper[a] - plan.u[i, a]
             point.u[i, a] = plan.u[i, a] + min(max(move, -most * low), most * high)
-        transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
+        model.transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
 
 
 @inlined
 def search(task, point, trial, mu, step, length, total, derivative):
-    """Step 7: put into `trial` what lowers the barrier function; it and the objective, or nan."""
+    """Step 7: find a `trial` that lowers the barrier function; objective, it and step, or nan."""
     while length > SHORTEST:
         follow(task, point, step, length, WITHIN, trial)
         objective, reached = measure(task, trial, mu)
@@ -722,13 +676,20 @@ def search(task, point, trial, mu, step, length, total, derivative):
 
 @inlined
 def remember(stages, step, before, length):
-    """Move the costates of the Hessian along the step, to those of its linear-quadratic problem."""
+    """Move the Hessian's costates along the step towards those of the linear-quadratic problem."""
     for i in range(1, len(step.v)):
         for a in range(NX):
-            after = step.v[i, a]
-            for b in range(NX):
-                after += step.V[i, a, b] * step.x[i, b]
+            after = costate(step, i, a)
             step.p[i, a] = before[i, a] + length * (after - before[i, a])
+
+
+@inlined
+def costate(step, i, a):
+    """p of the linear-quadratic problem after its step, i > 0."""
+    p = step.v[i, a]
+    for b in range(NX):
+        p += step.V[i, a, b] * step.x[i, b]
+    return p
 
 
 @inlined
@@ -749,57 +710,69 @@ def advance(task, duals, step, length):
 
 
 @inlined
-def slacks_of(task):
-    """The number of slacks of a stage, one for each row that is not hard."""
-    return SOFT + PER * task.lines
+def places(stages, lines, first):
+    """Sizes of a stage in z and in g; where rows of stage 0, bounds and gradient are in a solution.
+
+    Its u_0 is given where `first` is 1.
+    """
+    rows, slacks = FIXED + PER * lines, SOFT + PER * lines
+    z, g = NX + NU + slacks, NX + rows
+    size = stages * z - NU
+    bounds = size + stages * g + first * NU
+    return z, g, size + 2 * NX + first * NU, bounds, bounds + size
 
 
 @inlined
-def place(task, i):
-    """Where x_i stands in a solution, and the multipliers of the rows of stage i."""
-    last, slacks, rows = len(task.rate) - 1, slacks_of(task), FIXED + PER * task.lines
-    variables = last * (NX + NU + slacks) + NX + slacks
-    of_rows = NX + task.first * NU + i * (NX + rows) + (NX if i < last else 0)
-    return i * (NX + NU + slacks), variables + of_rows
+def recall(task, start, solution, plan, old):
+    """The plan and the multipliers of a warm start, from a stage later where that is shifted.
+
+    The multiplier is -1 of a row that is not planned, and of every row at a cold start.
+    """
+    last, ahead, cold = len(plan.u), 1 if start == SHIFTED else 0, start in (COLD, HELD)
+    first = 1 if len(solution) > places(last + 1, task.lines, 0)[4] else 0
+    z_size, g_size, rows, bounds, _ = places(last + 1, task.lines, first)
+    for i in range(last + 1):
+        for a in range(NX):
+            plan.x[i, a] = solution[min(i + ahead, last) * z_size + a]
+        for j in range(task.rows):
+            source, side = min(i + ahead, last), j - task.rows + len(task.sides)
+            if task.kind[source, j] != PLANNED:
+                source = i
+            lam = -1.0
+            if task.kind[source, j] == PLANNED and not cold:
+                lam = solution[rows + source * g_size - (NX if source == last else 0) + j]
+                if side >= 0:
+                    nu = solution[bounds + source * z_size + int(task.sides[side, 0])]
+                    lam = task.sides[side, 1] * nu
+            old.lam[i * task.rows + j] = lam
+    for i in range(last):
+        z = min(i + ahead, last - 1) * z_size + NX
+        for a in range(NU):
+            plan.u[i, a] = solution[z + a]
+            old.above[i, a] = 0.0 if cold else solution[bounds + z + a]
+            old.below[i, a] = -old.above[i, a]
 
 
 @inlined
-def bounds_place(task):
-    """How far behind a variable the multiplier of its bound stands, and where all of these end."""
-    z, g = place(task, len(task.rate) - 1)
-    bounds = g + FIXED + PER * task.lines
-    return bounds, bounds + z + NX + slacks_of(task)
-
-
-@inlined
-def begin_inputs(task, point, state, action, start, inputs, warm_start):
+def begin_inputs(task, point, state, action, start, inputs):
     """The inputs of a start, inside their bounds."""
-    last, ahead = len(point.u), 1 if start == SHIFTED else 0
     for a in range(NX):
         point.x[0, a] = state[a]
-    for i in range(last):
-        z = place(task, min(i + ahead, last - 1))[0]
+    for i in range(len(point.u)):
         for a in range(NU):
             low, high = task.lower[a], task.upper[a]
             push = PUSH[start] * min(1.0, high - low)
-            u = inputs[i, a] if start in (COLD, HELD) else warm_start[z + NX + a]
-            point.u[i, a] = min(max(u, low + push), high - push)
+            point.u[i, a] = min(max(inputs[i, a], low + push), high - push)
             if i < task.first:
                 point.u[i, a] = action[a]
 
 
 @inlined
-def recall(task, start, warm_start, point, plan):
-    """The states of a warm start beside the inputs of `point`; how far this leaves them.
-
-    Returns whether a deviation of the first state grows: then the inputs alone lead nowhere.
-    """
-    last, ahead = len(point.u), 1 if start == SHIFTED else 0
-    apart, farthest, largest = 0.0, 0.0, 0.0
+def strays(point, plan, ahead):
+    """Whether the inputs of `point`, which `plan` receives, lead ever farther from its states."""
+    last, apart, farthest, largest = len(point.u), 0.0, 0.0, 0.0
     for i in range(last + 1):
-        z = place(task, min(i + ahead, last))[0]
         for a in range(NX):
-            plan.x[i, a] = warm_start[z + a]
             largest = max(largest, abs(plan.x[i, a]))
             away = abs(point.x[i, a] - plan.x[i, a])
             if i == 0:
@@ -812,19 +785,15 @@ def recall(task, start, warm_start, point, plan):
 
 
 @allocating
-def described(theta, data, lower, upper, sides, kind, discount, weights, first):
+def task_of(theta, data, lower, upper, sides, kind, discount, weights, first):
     """The problem before `scale`."""
-    stages, rows = len(discount), len(weights) + len(sides)
-    planned, begin = np.empty(stages * rows), 1
-    for i in range(stages):
-        for j in range(rows):
-            planned[i * rows + j] = 1.0 if kind[i, j] == PLANNED else 0.0
-            if i == 0 and kind[0, j] == PLANNED:
-                begin = 0
+    count, rows = len(discount), len(weights) + len(sides)
+    planned = (kind == PLANNED).astype(np.float64).reshape(-1)
+    begin = 0 if (kind[0] == PLANNED).any() else 1
     lines = (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
     return Task(
         theta, data, lower, upper, sides, kind, planned, discount.copy(),
-        np.empty(stages * rows), first, begin, rows, lines,
+        np.empty(count * rows), first, begin, rows, lines,
     )  # fmt: skip
 
 
@@ -832,9 +801,9 @@ def described(theta, data, lower, upper, sides, kind, discount, weights, first):
 def scale(task, point, weights):
     """Divide the problem by the size of its costs along the plan of a start, which is returned."""
     last, rate = len(point.u), task.rate
-    factor = rate[last] * terminal_size(point.x[last], task.theta, task.data[last])
+    factor = rate[last] * model.terminal_size(point.x[last], task.theta, task.data[last])
     for i in range(last):
-        size = stage_size(point.x[i], point.u[i], task.theta, task.data[i])
+        size = model.stage_size(point.x[i], point.u[i], task.theta, task.data[i])
         factor = max(factor, rate[i] * size)
     most = DEARER * factor
     for j in range(len(weights)):
@@ -855,50 +824,26 @@ def scale(task, point, weights):
 
 
 @inlined
-def begin_multipliers(task, point, duals, start, mu, factor, warm_start):
+def begin_bounds(task, point, duals, old, mu, gain):
     """The bounds' multipliers: the warm start's, or central ones where these are larger."""
-    last, ahead = len(point.u), 1 if start == SHIFTED else 0
-    gain, bounds = task.rate[0] / task.rate[ahead] / factor, bounds_place(task)[0]
-    for i in range(last):
-        nu = bounds + place(task, min(i + ahead, last - 1))[0] + NX
+    for i in range(len(point.u)):
         for a in range(NU):
-            below, above = (
-                mu / (point.u[i, a] - task.lower[a]),
-                mu / (task.upper[a] - point.u[i, a]),
-            )
-            if start not in (COLD, HELD):
-                below = max(-gain * warm_start[nu + a], below)
-                above = max(gain * warm_start[nu + a], above)
-            duals.below[i, a] = below if i >= task.first else 0.0
-            duals.above[i, a] = above if i >= task.first else 0.0
+            below = mu / (point.u[i, a] - task.lower[a])
+            above = mu / (task.upper[a] - point.u[i, a])
+            free = i >= task.first
+            duals.below[i, a] = max(gain * old.below[i, a], below) if free else 0.0
+            duals.above[i, a] = max(gain * old.above[i, a], above) if free else 0.0
 
 
 @inlined
-def old_row(task, i, j, solution):
-    """The multiplier of row j of a stage in a solution."""
-    z, g = place(task, i)
-    side = j - FIXED - PER * task.lines
-    if side < 0:
-        return solution[g + j]
-    return task.sides[side, 1] * solution[bounds_place(task)[0] + z + int(task.sides[side, 0])]
-
-
-@inlined
-def begin_rows(task, point, duals, start, mu, factor, warm_start):
+def begin_rows(task, point, duals, old, mu, gain):
     """The rows' multipliers: central, or the warm start's unless these are nearer to 0 or W."""
-    last, ahead = len(point.u), 1 if start == SHIFTED else 0
-    gain = task.rate[0] / task.rate[ahead] / factor
-    for i in range(task.begin, last + 1):
-        for j in range(task.rows):
-            t, source = i * task.rows + j, min(i + ahead, last)
-            if task.kind[source, j] != PLANNED:
-                source = i
-            middle = mu / point.slack[t]
-            if start not in (COLD, HELD) and task.kind[source, j] == PLANNED:
-                old = gain * old_row(task, source, j, warm_start)
-                middle = max(old, middle) if point.h[t] < 0.0 else min(old, middle)
-            weight = task.weights[t]
-            duals.lam[t] = min(max(middle, INSIDE * weight), (1.0 - INSIDE) * weight)
+    for t in range(task.begin * task.rows, len(duals.lam)):
+        lam, weight = mu / point.slack[t], task.weights[t]
+        if old.lam[t] >= 0.0:
+            known = gain * old.lam[t]
+            lam = max(known, lam) if point.h[t] < 0.0 else min(known, lam)
+        duals.lam[t] = min(max(lam, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined
@@ -942,16 +887,10 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
             total = objective + barrier(task, point, mu)
         iteration += 1
         condense(task, point, duals, stages, mu)
-        added = 0.0
-        while not factorise(stages, added, task.first, step) and added < DELTA_LARGEST:
-            if added > 0.0:
-                added = DELTA_GROWS * added
-            else:
-                added = (
-                    max(delta / DELTA_SHRINKS, DELTA_LEAST * largest)
-                    if delta > 0.0
-                    else DELTA_FIRST * largest
-                )
+        least = max(delta / DELTA_SHRINKS, DELTA_LEAST * largest)
+        added = regularise(
+            stages, task.first, step, least if delta > 0.0 else DELTA_FIRST * largest
+        )
         delta = added if added > 0.0 else delta
         primal, dual, derivative = newton_step(task, point, duals, stages, mu, step)
         reached, reached_total, length = search(
@@ -977,45 +916,34 @@ def settle(task, point, tie, h, size, held):
     """h of the rows of stage 0, and the multipliers of the soft ones that no plan can change."""
     x, u, theta, d = point.x[0], point.u[0], task.theta, task.data[0]
     rows_of(task, point.x, point.u, 0, h)
-    fixed_sizes(x, u, theta, d, size, 0)
-    for line in range(task.lines):
-        line_sizes(x, u, theta, d, d, size, OWN + WIDTH * line, FIXED + PER * line)
+    model.size_rows(x, u, theta, d, size, 0, task.lines)
     for j in range(FIXED + PER * task.lines):
         if task.kind[0, j] == SETTLED:
-            soft = j < SOFT or j >= FIXED
-            held[j] = task.weights[j] if soft and h[j] > tie * size[j] else 0.0
+            held[j] = task.weights[j] if h[j] > tie * size[j] else 0.0
 
 
 @inlined
-def theta_of_rows(task, x, u, i, held, gradient):
-    """Add the gradient of held' h of a stage in theta."""
-    t, theta, d = task.rows * i, task.theta, task.data[i]
-    theta_fixed(x, u, theta, d, held, gradient, t)
-    for line in range(task.lines):
-        theta_line(x, u, theta, d, d, held, gradient, OWN + WIDTH * line, t + FIXED + PER * line)
-
-
-@inlined
-def write_solution(task, point, duals, stages, objective, factor, tie, gradient, out):
+def write_solution(task, point, duals, stages, objective, factor, tie, out):
     """Write the solution in the order of `Ocp`, and the value's gradient: the kernel's Lagrangian.
 
     Returns the value, the largest violation of a hard row and the largest number in the plan.
     """
     last, held, h, sides = len(point.u), stages.held, point.h, FIXED + PER * task.lines
-    bounds, end = bounds_place(task)
+    z_size, g_size, rows, bounds, end = places(last + 1, task.lines, task.first)
     violation, largest = 0.0, 0.0
     settle(task, point, tie, h, stages.firm, held)
-    value = factor * objective + initial_cost(point.x[0], task.theta, task.data[0])
+    value = factor * objective + model.initial_cost(point.x[0], task.theta, task.data[0])
+    gradient = out[end:]
     gradient[:] = 0.0
     for i in range(last + 1):
-        z, g = place(task, i)
+        z, g = i * z_size, rows + i * g_size - (NX if i == last else 0)
         u, rate, data = point.u[min(i, last - 1)], task.rate[i:], task.data[i]
         for a in range(NX):
             out[z + a] = point.x[i, a]
             out[bounds + z + a] = 0.0
             largest = max(largest, abs(point.x[i, a]))
         if i < last:
-            stage_theta(point.x[i], u, task.theta, data, rate, stages.p[i + 1], gradient)
+            model.stage_theta(point.x[i], u, task.theta, data, rate, stages.p[i + 1], gradient)
             after = g - NX if i > 0 else g - 2 * NX - task.first * NU
             for a in range(NX):
                 out[after + a] = -factor * stages.p[i + 1, a]
@@ -1023,8 +951,8 @@ def write_solution(task, point, duals, stages, objective, factor, tie, gradient,
                 out[z + NX + a] = u[a]
                 out[bounds + z + NX + a] = factor * (duals.above[i, a] - duals.below[i, a])
         else:
-            terminal_theta(point.x[i], task.theta, data, rate, gradient)
-        theta_of_rows(task, point.x[i], u, i, held, gradient)
+            model.terminal_theta(point.x[i], task.theta, data, rate, gradient)
+        model.theta_rows(point.x[i], u, task.theta, data, held, gradient, i * task.rows, task.lines)
         if i == 0:
             for a in range(NX):
                 out[g - NX - task.first * NU + a] = -factor * stages.p[0, a]
@@ -1033,59 +961,108 @@ def write_solution(task, point, duals, stages, objective, factor, tie, gradient,
         sigma = z + NX + (NU if i < last else 0)
         for j in range(task.rows):
             t = i * task.rows + j
-            planned = task.kind[i, j] == PLANNED
-            there = planned or (task.kind[i, j] == SETTLED and j < sides)
-            beyond, price = max(0.0, h[t]) if there else 0.0, factor * held[t]
+            beyond = max(0.0, h[t]) if task.kind[i, j] in (PLANNED, SETTLED) else 0.0
+            price = factor * held[t]
             if j >= sides:
                 out[bounds + z + int(task.sides[j - sides, 0])] += task.sides[j - sides, 1] * price
             else:
                 out[g + j] = price
             if j >= sides or SOFT <= j < FIXED:
-                violation = max(violation, beyond if planned else 0.0)
+                violation = max(violation, beyond)
                 continue
             weight, k = factor * task.weights[t], sigma + (j if j < SOFT else SOFT + j - FIXED)
             value += weight * beyond
             out[k] = beyond
             out[bounds + k] = price - weight
     for a in range(NTHETA):
-        out[end + a] = factor * gradient[a]
-        gradient[a] = 0.0
-    initial_theta(point.x[0], task.theta, task.data[0], gradient)
-    for a in range(NTHETA):
-        out[end + a] += gradient[a]
+        gradient[a] *= factor
+    model.initial_theta(point.x[0], task.theta, task.data[0], gradient)
     return value, violation, largest
 
 
 @allocating
+def allocate_point(N, every):
+    """Space for an iterate."""
+    return Point(
+        np.empty((N + 1, NX)), np.empty((N, NU)), np.empty(every), np.empty(every), np.empty(every)
+    )
+
+
+@allocating
 def allocate(N, rows):
-    """Space for an iterate, a trial of the next one, multipliers, derivatives and a step."""
-    point = Point(
-        np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.empty((N + 1) * rows),
-    )  # fmt: skip
-    trial = Point(
-        np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.empty((N + 1) * rows),
-    )  # fmt: skip
-    duals = Duals(np.empty((N + 1) * rows), np.empty((N, NU)), np.empty((N, NU)))
+    """Space for an iterate, another, multipliers twice, derivatives and a step."""
+    n, every = N + 1, (N + 1) * rows
+    duals = Duals(np.empty(every), np.empty((N, NU)), np.empty((N, NU)))
+    old = Duals(np.empty(every), np.empty((N, NU)), np.empty((N, NU)))
     stages = Stages(  # what is written at its nonzeros begins as zeros
         np.zeros((N, NX, NX)), np.zeros((N, NX, NU)),
-        np.zeros(((N + 1) * rows, NX)), np.zeros(((N + 1) * rows, NU)),
-        np.empty((N + 1, NX)), np.empty((N + 1, NU)), np.empty((N + 1, NX)), np.empty((N + 1, NU)),
-        np.empty((N + 1, NX)), np.zeros((N + 1, NX)),
-        np.empty((N + 1, NX, NX)), np.empty((N + 1, NU, NX)), np.empty((N + 1, NU, NU)),
-        np.empty((N + 1, NX)), np.empty((N + 1, NU)),
-        np.empty((N + 1) * rows), np.empty((N + 1) * rows), np.zeros((N + 1) * rows),
-        np.empty((N + 1) * rows), np.empty((N + 1) * rows),
+        np.zeros((every, NX)), np.zeros((every, NU)),
+        np.empty((n, NX)), np.empty((n, NU)), np.empty((n, NX)), np.empty((n, NU)),
+        np.empty((n, NX)), np.zeros((n, NX)),
+        np.empty((n, NX, NX)), np.empty((n, NU, NX)), np.empty((n, NU, NU)),
+        np.empty((n, NX)), np.empty((n, NU)),
+        np.empty(every), np.empty(every), np.zeros(every), np.empty(every), np.empty(every),
     )  # fmt: skip
     step = Step(
-        np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N + 1) * rows), np.empty((N, NU)), np.empty((N, NU)),
-        np.empty((N + 1, NX)), np.empty((N + 1, NX, NX)), np.empty((N + 1, NX)),
+        np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((n, NX)), np.empty((N, NU)),
+        np.empty(every), np.empty((N, NU)), np.empty((N, NU)),
+        np.empty((n, NX)), np.empty((n, NX, NX)), np.empty((n, NX)),
         np.empty(NX), np.empty((NX, NX)), np.empty((NX, NU)),
         np.empty((NU, NU)), np.empty((NU, NX)), np.empty(NU),
     )  # fmt: skip
-    return point, trial, duals, stages, step
+    return allocate_point(N, every), allocate_point(N, every), duals, old, stages, step
+
+
+@allocating
+def solve(
+    data, lower, upper, sides, kind, discount, weights, tie, state, theta, action, fixed,
+    start, limit, tolerance, inputs, warm_start, out,
+):  # fmt: skip
+    """Solve a problem from one start; see `riccati.Arguments` for the first arguments.
+
+    Returns value, iterations, the end, the violation of hard rows, and the relative error; `out`
+    receives z, lam and nu in the order of `Ocp`, as `warm_start` has them, and then the gradient.
+    A cold start takes `inputs`, (N, NU), and a warm one `warm_start`. A plan with a state beyond
+    `ABSURD` is none: its value is infinite.
+    """
+    task = task_of(theta, data, lower, upper, sides, kind, discount, weights, fixed)
+    point, trial, duals, old, stages, step = allocate(len(discount) - 1, task.rows)
+    mu, cold, ahead = START_MU[start], start in (COLD, HELD), 1 if start == SHIFTED else 0
+    recall(task, start, warm_start, trial, old)
+    begin_inputs(task, point, state, action, start, inputs if cold else trial.u)
+    if start == HELD:
+        regulate(task, trial, stages, step, point)
+    else:
+        roll(task, point)
+    factor = scale(task, point, weights)
+    gain = task.rate[0] / task.rate[ahead] / factor
+    begin_bounds(task, point, duals, old, mu, gain)
+    if not cold and strays(point, trial, ahead):
+        measure(task, trial, mu)
+        begin_rows(task, trial, duals, old, mu, gain)
+        linearise(task, trial, duals, stages, stages.p)
+        condense(task, trial, duals, stages, mu)
+        regularise(stages, task.first, step, DELTA_FIRST)
+        follow(task, trial, step, 0.0, WITHIN, point)
+    for a in range(NX):
+        trial.x[0, a] = state[a]
+    objective, total = measure(task, point, mu)
+    begin_rows(task, point, duals, old, mu, gain)
+    objective, iterations, ended, error, added, where = iterate(
+        task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
+    )
+    if where:
+        point, trial = trial, point
+    if ended == SOLVED and (cold or added > 0.0):  # no plan at a maximum or saddle is a solution
+        condense(task, point, duals, stages, RIGID)
+        if not factorise(stages, FLAT, task.first, step):
+            ended = SADDLE
+    value, violation, largest = write_solution(
+        task, point, duals, stages, objective, factor, tie, out
+    )
+    if not largest <= ABSURD:
+        value = np.inf
+    return value, float(iterations), float(ended), violation, error
 
 
 vector, matrix, tensor = float64[::1], float64[:, ::1], float64[:, :, ::1]

@@ -3,9 +3,8 @@
 `stages.write` generates a module of the same name, and the solver is compiled beside that one, so
 that nothing here ever runs. Names that end in an underscore are results: px, pu, q, r, Q, S, R and
 gradient are added to what the array holds, the others written. A stage's Lagrangian is discount l +
-costate' f + lam' h. There are the same functions of `fixed` rows and of those of a `line` of data.
-Arrays of rows hold those of all stages; `at` says where the rows begin, `of` where the line begins.
-A row that depends on u is absent at stage N, and the u that the kernel gives there counts nothing.
+costate' f + lam' h. Arrays of rows hold those of all stages; `at` says where those of the stage
+begin. A row that depends on u is absent at stage N, and the u that is given there counts nothing.
 """
 
 from typing import Any
@@ -32,13 +31,13 @@ terminal_mixed = _generated  # x, theta, d, discount, w, q_
 stage_along = _generated  # x, u, theta, d, discount, costate, dx, du, dcostate, w, gradient_
 terminal_along = initial_along = _generated  # x, theta, d, (discount, dx,) w, gradient_
 
-# Of rows: those of a line take it behind d, and `of` and `at` after all others.
-fixed_sizes = line_sizes = _generated  # x, u, theta, d, size_, at
-fixed_rows = line_rows = _generated  # x, u, theta, d, h_, at
-expand_fixed = expand_line = _generated  # x, u, theta, d, lam, hx_, hu_, px_, pu_, Q_, S_, R_, at
-condense_fixed = condense_line = _generated  # stiff, pull, hx, hu, q_, r_, Q_, S_, R_, at
-along_fixed = along_line = _generated  # hx, hu, dx, du, h_, at
-theta_fixed = theta_line = _generated  # x, u, theta, d, lam, gradient_, at
-mixed_fixed = mixed_line = _generated  # x, u, theta, d, lam, w, q_, r_, h_, at
-along_theta_fixed = along_theta_line = _generated  # x, u, theta, d, lam, dx, du, dlam, w,
-#   gradient_, at
+# Of all rows of a stage. The generated module has a function of `fixed` rows and one of a `line`
+# beside each, as `measure_fixed` and `measure_line`.
+size_rows = _generated  # x, u, theta, d, size_, at, lines
+measure_rows = _generated  # x, u, theta, d, h_, at, lines
+expand_rows = _generated  # x, u, theta, d, lam, hx_, hu_, px_, pu_, Q_, S_, R_, at, lines
+condense_rows = _generated  # stiff, pull, hx, hu, q_, r_, Q_, S_, R_, at, lines
+along_rows = _generated  # hx, hu, dx, du, h_, at, lines
+theta_rows = _generated  # x, u, theta, d, lam, gradient_, at, lines
+mixed_rows = _generated  # x, u, theta, d, lam, w, q_, r_, h_, at, lines
+along_theta_rows = _generated  # x, u, theta, d, lam, dx, du, dlam, w, gradient_, at, lines

@@ -1,4 +1,4 @@
-"""The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
+"""The solver of `kernel`, compiled for a plant and called for one OCP."""
 
 import time
 import warnings
@@ -17,10 +17,10 @@ from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.problem import Problem
-from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.solution import Solution, SolverError
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.control.solvers.nlpsol import Fatrop, Program
+from nmpcrl.control.solvers.nlpsol import Fatrop, Program, carried
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Prepared, Solver
 from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
@@ -29,10 +29,8 @@ PERTURBED = 4  # starts from random inputs, after everything else
 SEVERAL = 5  # cold starts besides the one that feedback holds
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
-COLD, SHIFTED, SAME = map(
-    int, (Start.COLD, Start.SHIFTED, Start.SAME)
-)  # as machine code takes them
-SOLVED = float(End.SOLVED)  # as it returns them
+COLD, SHIFTED, SAME = map(int, (Start.COLD, Start.SHIFTED, Start.SAME))  # for machine code
+SOLVED = float(End.SOLVED)  # from machine code
 ENDS = {
     End.SOLVED: LED_ASTRAY,
     End.STALLED: "found no descent",
@@ -42,19 +40,14 @@ ENDS = {
 }
 TEXTS = {  # compiled beside `model`; read with the other modules, so that an edit mixes nothing
     name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
-    for name in ("codes", "kernel", "solve", "find", "slopes")
+    for name in ("codes", "kernel", "find", "slopes")
 }
-PARTS = {  # the modules of each entry, beside `model`
-    "find": ("codes", "kernel", "solve", "find"),
-    "slopes": ("codes", "kernel", "slopes"),
-}
-NAME = "riccati"
 ABSURD = 1e24  # no value is larger
 UNBOUNDED = 1e20  # stands for an input without a bound
 
 
 class Arguments(NamedTuple):
-    """The first arguments of `solve.solve`, by name; u_0 is free or fixed."""
+    """The first arguments of `kernel.solve`, by name; u_0 is free or fixed."""
 
     data: Matrix  # d_0, ..., d_N
     lower: Vector  # of the inputs, (m,)
@@ -87,7 +80,7 @@ def _loaded(entry: str, problem: Problem, notice: str) -> Any:
     texts = {
         "__init__": f"from .{entry} import {entry}\n",
         "model": stages.write(problem),
-        **{name: TEXTS[name] for name in PARTS[entry]},
+        **{name: TEXTS[name] for name in ("codes", "kernel", entry)},
     }
     problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
     return problem.machine_code[entry]
@@ -97,10 +90,11 @@ def _loaded(entry: str, problem: Problem, notice: str) -> Any:
 class Riccati(Solver):
     """The interior point of `kernel`, compiled for a plant at its first solve."""
 
-    name: ClassVar[str] = NAME
+    name: ClassVar[str] = "riccati"
     code: Callable[[Problem], Any] = field(default=machine_code, repr=False)
-    starts: int = SEVERAL  # cold ones, of which the best plan counts; from 2 on, one more that is
-    # held by feedback
+    starts: int = (
+        SEVERAL  # cold ones, of which the best plan counts; if several, another by feedback
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -125,20 +119,18 @@ DEFAULT = Riccati()
 
 
 class Compiled:
-    """Calls the machine code of a problem: starts, second tries, and fatrop where all fail."""
+    """The machine code of a problem, called for one OCP; where no start succeeds, fatrop solves."""
 
     def __init__(self, ocp: Ocp, solve: Any, solver: Riccati = DEFAULT) -> None:
         problem = self._problem = ocp.problem
-        self._ocp, self._solver = ocp, solver
-        self.code = solve
+        self._ocp, self.code = ocp, solve
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._split = self._standing.size  # where a solution's gradient begins
         self._size = self._split + ocp.theta.numel()
         self._no_action = np.zeros(problem.inputs)
         self.tolerance = solver.tolerance
-        N = problem.horizon
-        others = cold_inputs(problem, N, solver.starts - 1)
+        N, others = problem.horizon, cold_inputs(problem, problem.horizon, solver.starts - 1)
         self.others = np.reshape(np.array(others), (-1, N, problem.inputs))
         self.drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
         sides = [
@@ -148,14 +140,14 @@ class Compiled:
         ]
         kind = problem.active.astype(np.int64)  # 1 where a plan can change a row
         kind[0, ocp.settled_rows] *= np.where(problem.soft[ocp.settled_rows], 2, 0)
-        stages = np.arange(problem.horizon + 1)[:, None]
+        later = np.repeat(np.minimum(np.arange(N + 1), 1)[:, None], len(sides), axis=1)
         self.arguments = Arguments(
             problem.data.copy(),  # which may be written to, as compiled code wants it
             np.maximum(problem.lower, -UNBOUNDED),
             np.minimum(problem.upper, UNBOUNDED),
             np.reshape(np.array(sides, float), (-1, 3)),
-            np.hstack([kind, np.repeat(np.minimum(stages, 1), len(sides), axis=1)]),
-            ocp.problem.gamma ** np.arange(problem.horizon + 1, dtype=float),
+            np.hstack([kind, later]),
+            problem.gamma ** np.arange(N + 1, dtype=float),
             problem.weights.copy(),
             ocp.tie,
         )
@@ -183,19 +175,10 @@ class Compiled:
         )  # fmt: skip
         if end == SOLVED and value < ABSURD:
             return Solution(
-                state,
-                theta,
-                value,
-                out[self._split :],
-                int(iterations),
-                time.perf_counter() - began,
-                out[: self._split],
-                self._ocp,
-                NAME,
-                data,
-                int(failed),
-                violation,
-            )
+                state, theta, value, out[self._split :], int(iterations),
+                time.perf_counter() - began, out[: self._split], self._ocp, Riccati.name, data,
+                int(failed), violation,
+            )  # fmt: skip
         try:
             found = self._fatrop.solve(state, theta, None, *action, began=began, data=data)
         except SolverError:
@@ -214,37 +197,30 @@ class Compiled:
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
-        return self._slopes(solution, vector, np.zeros(self._ocp.inputs.shape))
+        return self._slopes(solution, vector, self._no_action)
 
     def policy(self, solution: Solution) -> Matrix | None:
         """du_0 / dtheta, shape (m, d), a sweep an input; None likewise."""
-        still, weights = (
-            np.zeros(solution.theta.size),
-            np.zeros((self._problem.inputs, *self._ocp.inputs.shape)),
-        )
-        weights[:, 0] = np.eye(self._problem.inputs)
+        still, weights = np.zeros(solution.theta.size), np.eye(self._problem.inputs)
         found = [self._slopes(solution, still, one) for one in weights]
         return None if found[0] is None else np.array(found)
 
     def feedback(self, solution: Solution) -> Matrix | None:
         """du_0 / ds, shape (m, n), the gain of stage 0; None likewise."""
-        d, (n, m) = solution.theta.size, (self._problem.states, self._problem.inputs)
-        if self._fixed:
-            return np.zeros((m, n))
-        still, inputs = np.zeros(d), np.zeros(self._ocp.inputs.shape)
-        found = self._slopes(solution, still, inputs, more=n * m)
-        return None if found is None else found[d:].reshape(m, n)
+        d, shape = solution.theta.size, (self._problem.inputs, self._problem.states)
+        found = self._slopes(solution, np.zeros(d), self._no_action, more=shape[0] * shape[1])
+        return None if found is None else found[d:].reshape(shape)
 
     def _slopes(
-        self, solution: Solution, along: Vector, inputs: Matrix, *, more: int = 0
+        self, solution: Solution, along: Vector, of_action: Vector, *, more: int = 0
     ) -> Vector | None:
-        """`slopes.slopes` along a direction of theta, of a sum of inputs with these weights."""
+        """`slopes.slopes` along a direction of theta, of a sum of u_0 with these weights."""
         if solution.took_over:  # whose states are not rolled out
             return None
         action = solution.action if self._fixed else self._no_action
         given = (solution.state, solution.theta, action, self._fixed, solution.point)
-        states, out = np.zeros(self._ocp.states.shape), np.empty(solution.theta.size + more)
-        formed = self.slopes(solution.data, *self._rest, *given, along, states, inputs, out)
+        out = np.empty(solution.theta.size + more)
+        formed = self.slopes(solution.data, *self._rest, *given, along, of_action, out)
         return out if formed else None
 
     @cached_property
@@ -259,12 +235,6 @@ class Compiled:
 
     def point_of(self, warm_start: Solution) -> Vector:
         """The warm start's z, lam and nu in the order of this OCP."""
-        ocp, old = self._ocp, warm_start.ocp
-        if old is ocp:
+        if warm_start.ocp is self._ocp:
             return warm_start.point
-        check_shape(warm_start, ocp)
-        z, nu = warm_start.primal, warm_start.bound_duals
-        lam = np.zeros(ocp.equality.size)
-        for here, there in ((ocp.obstacles, old.obstacles), (ocp.hard, old.hard)):
-            lam[here] = warm_start.constraint_duals[there]
-        return np.concatenate([z, lam, nu])
+        return np.concatenate(carried(warm_start, self._ocp))

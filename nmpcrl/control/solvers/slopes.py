@@ -1,65 +1,47 @@
 """Second derivatives of a `Problem`'s value, and first ones of its plan, at a solution.
 
 If theta moves along w, the solution moves along (dx, du, dp, dlam), which solves Newton's system of
-`kernel` with what w adds to KKT's violation on the right: K step + G w = 0. The value's Hessian is
-then the change of its gradient along (step, w), L_tt w + G' step. A weighted sum s'(x, u) of the
-plan changes by -s' K^-1 G w, so its gradient in theta is G' step with K step + s = 0: the same
-sweep from the other side, one for each number of the plan and not one for each parameter.
+`kernel` with the derivative of KKT along w on the right: K step + G w = 0. The value's Hessian is
+then the change of its gradient along (step, w), L_tt w + G' step. A weighted sum s' u_0 of inputs
+changes by -s' K^-1 G w, so its gradient in theta is G' step with K step + s = 0: the same sweep,
+one for each input and not one for each parameter.
 
-Where rows and bounds are active that no input can follow all at once, springs of the barrier would
-share what is left between them: `independent` finds out, and `Sensitivity` takes a side instead.
+Where more rows and bounds are active than the inputs can follow, the barrier would share the rest
+between them. `independent` finds such points, at which `Sensitivity` takes one side of a kink.
 
 The dynamics' share of G w, f_theta w, is the gap of each stage that the sweep closes.
 """
 
-import numpy as np
 from numba import njit, types
 
+from . import model
 from .kernel import (
     INSIDE,
-    PLANNED,
     PROBLEM,
     RIGID,
     SAME,
     allocate,
+    begin_bounds,
     begin_inputs,
-    begin_multipliers,
     condense,
-    described,
+    costate,
     factorise,
+    fold,
     inlined,
     linearise,
-    matrix,
     measure,
-    old_row,
     options,
-    place,
+    recall,
     roll,
     rows_along,
     scale,
     scale_rows,
     settle,
     sweep,
+    task_of,
     vector,
 )
-from .model import (
-    FIXED,
-    NTHETA,
-    NU,
-    NX,
-    OWN,
-    PER,
-    WIDTH,
-    along_theta_fixed,
-    along_theta_line,
-    initial_along,
-    mixed_fixed,
-    mixed_line,
-    stage_along,
-    stage_mixed,
-    terminal_along,
-    terminal_mixed,
-)
+from .model import NTHETA, NU, NX
 
 STIFF = 1e4  # at least, where a row is active
 GOLDEN = 0.6180339887498949
@@ -69,15 +51,11 @@ ROWS = 1e-10  # barrier parameter of the rows: of RIGID they lose digits, where 
 
 
 @inlined
-def restore_rows(task, duals, factor, solved):
+def restore_rows(task, duals, old, factor):
     """The rows' multipliers as they were solved for, upon which the costates depend."""
-    for i in range(task.begin, len(task.rate)):
-        for j in range(task.rows):
-            t = i * task.rows + j
-            weight, old = task.weights[t], 0.0
-            if task.kind[i, j] == PLANNED:
-                old = old_row(task, i, j, solved) / factor
-            duals.lam[t] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
+    for t in range(task.begin * task.rows, len(duals.lam)):
+        weight = task.weights[t]
+        duals.lam[t] = min(max(old.lam[t] / factor, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined
@@ -111,17 +89,9 @@ def independent(task, stages, step):
 @inlined
 def pull_of_rows(task, stages, i):
     """Add h' stiff off of a stage to q and r."""
-    first = FIXED + PER * task.lines
-    for j in range(task.rows):
-        t = i * task.rows + j
-        pull = stages.stiff[t] * stages.off[t]
-        if j >= first:
-            stages.q[i, int(task.sides[j - first, 0])] += pull * task.sides[j - first, 1]
-            continue
-        for a in range(NX):
-            stages.q[i, a] += pull * stages.hx[t, a]
-        for a in range(NU if i < len(stages.A) else 0):
-            stages.r[i, a] += pull * stages.hu[t, a]
+    for t in range(i * task.rows, (i + 1) * task.rows):
+        stages.firm[t], stages.pull[t] = 0.0, stages.stiff[t] * stages.off[t]
+    fold(task, stages, i)
 
 
 @inlined
@@ -134,42 +104,19 @@ def right_hand_side(task, point, stages, w):
         q, r, d, rate = stages.q[i], stages.r[i], task.data[i], task.rate[i:]
         x, u, t = point.x[i], point.u[min(i, last - 1)], i * task.rows
         if i < last:
-            stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, stages.gap[i + 1])
+            model.stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, stages.gap[i + 1])
         else:
-            terminal_mixed(x, theta, d, rate, w, q)
+            model.terminal_mixed(x, theta, d, rate, w, q)
         if i >= task.begin:
+            model.mixed_rows(x, u, theta, d, held, w, q, r, off, t, task.lines)
             for j in range(task.rows):
-                off[t + j] = 0.0
-            mixed_fixed(x, u, theta, d, held, w, q, r, off, t)
-            for line in range(task.lines):
-                mixed_line(
-                    x, u, theta, d, d, held, w, q, r, off,
-                    OWN + WIDTH * line, t + FIXED + PER * line,
-                )  # fmt: skip
-            for j in range(task.rows):
-                off[t + j] = off[t + j] if task.planned[t + j] > 0.0 else 0.0
+                in_theta = j < task.rows - len(task.sides) and task.planned[t + j] > 0.0
+                off[t + j] = off[t + j] if in_theta else 0.0
             pull_of_rows(task, stages, i)
 
 
 @inlined
-def costates_along(stages, step, dp):
-    """How the costates change along the step."""
-    last = len(step.u)
-    for i in range(last, -1, -1):
-        for a in range(NX):
-            total = stages.q[i, a]
-            for b in range(NX):
-                total += stages.Q[i, a, b] * step.x[i, b]
-            if i < last:
-                for b in range(NU):
-                    total += stages.S[i, b, a] * step.u[i, b]
-                for b in range(NX):
-                    total += stages.A[i, b, a] * dp[i + 1, b]
-            dp[i, a] = total
-
-
-@inlined
-def gradient_along(task, point, stages, step, dp, factor, w, out):
+def gradient_along(task, point, stages, step, factor, w, out):
     """The derivative of the value's gradient along the step and w."""
     last, theta, held = len(point.u), task.theta, stages.held
     for a in range(NTHETA):
@@ -179,59 +126,50 @@ def gradient_along(task, point, stages, step, dp, factor, w, out):
         x, dx = point.x[i], step.x[i]
         u, du = point.u[min(i, last - 1)], step.u[min(i, last - 1)]
         if i < last:
-            stage_along(x, u, theta, d, rate, stages.p[i + 1], dx, du, dp[i + 1], w, out)
+            model.stage_along(x, u, theta, d, rate, stages.p[i + 1], dx, du, step.p[i + 1], w, out)
         else:
-            terminal_along(x, theta, d, rate, dx, w, out)
-        along_theta_fixed(x, u, theta, d, held, dx, du, step.lam, w, out, t)
-        for line in range(task.lines):
-            along_theta_line(
-                x, u, theta, d, d, held, dx, du, step.lam, w, out,
-                OWN + WIDTH * line, t + FIXED + PER * line,
-            )  # fmt: skip
+            model.terminal_along(x, theta, d, rate, dx, w, out)
+        model.along_theta_rows(x, u, theta, d, held, dx, du, step.lam, w, out, t, task.lines)
     for a in range(NTHETA):
         out[a] *= factor
-    initial_along(point.x[0], theta, task.data[0], w, out)
+    model.initial_along(point.x[0], theta, task.data[0], w, out)
 
 
-SIGNATURE = types.boolean(*PROBLEM, vector, vector, matrix, matrix, vector)
+SIGNATURE = types.boolean(*PROBLEM, vector, vector, vector, vector)
 
 
 @njit(SIGNATURE, cache=True, **options)
 def slopes(
     data, lower, upper, sides, kind, discount, weights, tie,
-    state, theta, action, fixed, solved, w, of_states, of_inputs, out,
+    state, theta, action, fixed, solved, w, of_action, out,
 ):  # fmt: skip
-    """The Hessian times w, plus the gradient of a weighted sum of the plan, shape (NTHETA,).
+    """The Hessian times w, plus the gradient of the sum of u_0 with weights, shape (NTHETA,).
 
-    `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights. Returns whether it could
-    be formed: not where the solution is no strict minimum, or inputs cannot follow what is active.
-    Where `out` has NU NX more places, they are du_0 / ds, the gain of stage 0.
+    Returns whether it could be formed: not where the solution is no strict minimum, or inputs
+    cannot follow what is active. Where `out` has NU NX more places, they are du_0 / ds, the gain of
+    stage 0.
     """
     N, mu = len(discount) - 1, RIGID
-    task = described(theta, data, lower, upper, sides, kind, discount, weights, fixed)
-    point, _, duals, stages, step = allocate(N, task.rows)
-    dp = np.empty((N + 1, NX))
-    begin_inputs(task, point, state, action, SAME, point.u, solved)
+    task = task_of(theta, data, lower, upper, sides, kind, discount, weights, fixed)
+    point, plan, duals, old, stages, step = allocate(N, task.rows)
+    recall(task, SAME, solved, plan, old)
+    begin_inputs(task, point, state, action, SAME, plan.u)
     roll(task, point)
     factor = scale(task, point, weights)
-    begin_multipliers(task, point, duals, SAME, mu, factor, solved)
+    begin_bounds(task, point, duals, old, mu, 1.0 / factor)
     for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
-        z = place(task, i)[0]
         for a in range(NX):
-            point.x[i, a] = solved[z + a]
+            point.x[i, a] = plan.x[i, a]
     measure(task, point, ROWS)
-    restore_rows(task, duals, factor, solved)
+    restore_rows(task, duals, old, factor)
     linearise(task, point, duals, stages, stages.p)
     condense(task, point, duals, stages, mu)
     step.lam[:] = 0.0
     if not independent(task, stages, step):
         return False
     right_hand_side(task, point, stages, w)
-    for i in range(N + 1):
-        for a in range(NX):
-            stages.q[i, a] += of_states[i, a] / factor
-        for a in range(NU if i < N else 0):
-            stages.r[i, a] += of_inputs[i, a] / factor
+    for a in range(NU):
+        stages.r[0, a] += of_action[a] / factor
     factorise(stages, 0.0, task.first, step)
     sweep(task, stages, step)
     for i in range(task.first, N):
@@ -239,10 +177,12 @@ def slopes(
             if not abs(step.u[i, a]) < FARTHEST:
                 return False
     for k in range(len(out) - NTHETA):
-        out[NTHETA + k] = step.K[0, k // NX, k % NX]
-    costates_along(stages, step, dp)
+        out[NTHETA + k] = step.K[0, k // NX, k % NX] if task.first == 0 else 0.0
+    for i in range(1, N + 1):
+        for a in range(NX):
+            step.p[i, a] = costate(step, i, a)
     rows_along(task, stages, step)
     scale_rows(task, stages, step)
     settle(task, point, tie, point.h, stages.firm, stages.held)
-    gradient_along(task, point, stages, step, dp, factor, w, out)
+    gradient_along(task, point, stages, step, factor, w, out)
     return True

@@ -1,4 +1,4 @@
-"""What a solver of Eq. (2) is: a value with its options, which gets itself ready for a problem."""
+"""A solver of Eq. (2): a value with its options, which prepares itself for a problem."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from nmpcrl.control.diagnosis import SUBSTEPS
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import Solution
 
-TOLERANCE = 1e-8  # what is taken where none is said
+TOLERANCE = 1e-8  # the default
 LED_ASTRAY = f"led through numbers that are absurd: {SUBSTEPS}"
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
 
@@ -45,7 +45,7 @@ class Solver(ABC):
 
     @property
     def available(self) -> bool:
-        """Whether what it needs is installed."""
+        """Whether the packages that the solver needs are installed."""
         return True
 
     @abstractmethod

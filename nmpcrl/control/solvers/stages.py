@@ -6,6 +6,7 @@ derivatives are written at their nonzeros, and so are the products that fold the
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -23,11 +24,17 @@ from numba import njit
 NX, NU, NTHETA = {sizes}
 SOFT, FIXED, PER, OWN, WIDTH = {rows}
 '''
+ALL_ROWS = """{inner}def {name}_rows({fixed}, at, lines):
+    {name}_fixed({fixed}, at)
+    for line in range(lines):
+        {name}_line({of_line})
+"""
 MATRICES = ("A", "B", "Q", "S", "R", "hx", "hu")
 SPARSE = ("A", "B", "hx", "hu")
 ADDED = ("px", "pu", "q", "r", "Q", "S", "R", "gradient")
 BEGINS = {"line": "of", **dict.fromkeys(  # at which index of an array a stage's rows begin
     ("h", "size", "lam", "dlam", "hx", "hu", "stiff", "pull"), "at")}  # fmt: skip
+DIRECTIONS = {"x": "dx", "u": "du", "costate": "dcostate", "theta": "w", "lam": "dlam"}
 STEEP = 100.0  # slope of a stage that counts as much as a curvature of 2, as of Ipopt
 
 
@@ -42,7 +49,9 @@ def write(problem: Problem) -> str:
     fixed = of.fixed.numel()
     soft = int(np.isfinite(problem.weights[:fixed]).sum())
     rows = soft, fixed, of.each.numel(), of.d.numel(), of.line.numel()
-    bodies = [INNER + _written(f) for f in functions(problem)]
+    made = [*functions(problem)]
+    bodies = [INNER + _written(f) for f in made]
+    bodies += [_of_all_rows(f) for f in made if f.name().endswith("_line")]
     return "\n\n".join([HEADER.format(sizes=sizes, rows=rows), *bodies])
 
 
@@ -59,98 +68,85 @@ def _written(f: ca.Function) -> str:
     )
 
 
+def _of_all_rows(f: ca.Function) -> str:
+    """The text of a function of a stage's rows, from that of the rows of a line."""
+    given = [*f.name_in(), *(f"{name}_" for name in f.name_out())]
+    of_line = ["d" if name == "line" else name for name in given]
+    begins = ["OWN + WIDTH * line"] * ("line" in given) + ["at + FIXED + PER * line"]
+    return ALL_ROWS.format(
+        inner=INNER,
+        name=f.name().removesuffix("_line"),
+        fixed=", ".join(name for name in given if name != "line"),
+        of_line=", ".join(of_line + begins),
+    )
+
+
 def functions(problem: Problem) -> Iterator[ca.Function]:
     """Every function of `model`, with the names of its arguments."""
     e = problem.expressions
-    x, u, theta, n = e.x, e.u, e.theta, e.x.numel()
-    z = ca.vertcat(x, u)
+    n, z = e.x.numel(), ca.vertcat(e.x, e.u)
     discount, costate = ca.SX.sym("discount"), ca.SX.sym("costate", n)
-    dx, du, w = (ca.SX.sym(name, of.numel()) for name, of in (("dx", x), ("du", u), ("w", theta)))
-    dcostate = ca.SX.sym("dcostate", n)
-    point = {"x": x, "u": u, "theta": theta, "d": e.d}
-    end = {"x": x, "theta": theta, "d": e.d}
-    weighed = {**point, "discount": discount, "costate": costate}
-    weighed_end = {**end, "discount": discount}
+    s = {"x": e.x, "u": e.u, "theta": e.theta, "d": e.d, "discount": discount, "costate": costate}
+    s |= {to: ca.SX.sym(to, s[of].numel()) for of, to in DIRECTIONS.items() if of in s}
+    made, along = partial(_function, s), partial(_along, s)
+    point, end = "x u theta d", "x theta d"
+    weighed, weighed_end = f"{point} discount costate", f"{end} discount"
     path, last = discount * e.stage + ca.dot(costate, e.next_x), discount * e.terminal
     hessian, slope = ca.hessian(path, z)
-    bend_end, slope_end = ca.hessian(last, x)
-    moved = ((x, dx), (u, du), (costate, dcostate), (theta, w))
-    path_theta, last_theta, first_theta = (ca.gradient(f, theta) for f in (path, last, e.initial))
-
-    yield _function("transition", point, {"next_x": e.next_x})
-    yield _function("stage_cost", point, {"cost": e.stage})
-    yield _function("terminal_cost", end, {"cost": e.terminal})
-    yield _function("initial_cost", end, {"cost": e.initial})
-    yield _function("stage_size", point, {"cost": _size(e.stage, z)})
-    yield _function("terminal_size", end, {"cost": _size(e.terminal, x)})
-    of_stage = ca.gradient(discount * e.stage, z)
-    slopes = ca.jacobian(e.next_x, z)
+    bend_end, slope_end = ca.hessian(last, e.x)
+    path_theta, last_theta, first_theta = (ca.gradient(f, e.theta) for f in (path, last, e.initial))
+    of_stage, slopes = ca.gradient(discount * e.stage, z), ca.jacobian(e.next_x, z)
     expand = {"A": slopes[:, :n], "B": slopes[:, n:], "lx": of_stage[:n], "lu": of_stage[n:]}
-    yield _function("expand_stage", weighed, expand | _blocks(hessian, n))
-    yield _function("expand_terminal", weighed_end, {"lx": slope_end, "Q": bend_end})
-    yield _function("stage_theta", weighed, {"gradient": path_theta})
-    yield _function("terminal_theta", weighed_end, {"gradient": last_theta})
-    yield _function("initial_theta", end, {"gradient": first_theta})
-    mixed = ca.jtimes(slope, theta, w)
-    of_theta = {"q": mixed[:n], "r": mixed[n:], "f": ca.jtimes(e.next_x, theta, w)}
-    yield _function("stage_mixed", {**weighed, "w": w}, of_theta)
-    yield _function(
-        "terminal_mixed", {**weighed_end, "w": w}, {"q": ca.jtimes(slope_end, theta, w)}
-    )
-    steps = {"dx": dx, "du": du, "dcostate": dcostate, "w": w}
-    yield _function("stage_along", {**weighed, **steps}, {"gradient": _along(path_theta, *moved)})
-    yield _function(
-        "terminal_along",
-        {**weighed_end, "dx": dx, "w": w},
-        {"gradient": _along(last_theta, (x, dx), (theta, w))},
-    )
-    yield _function(
-        "initial_along", {**end, "w": w}, {"gradient": ca.jtimes(first_theta, theta, w)}
-    )
-    for name, rows, more in (("fixed", e.fixed, {}), ("line", e.each, {"line": e.line})):
-        sizes = problem.row_sizes(rows)
-        yield _function(f"{name}_sizes", {**point, **more}, {"size": sizes})
-        yield from _of_rows(name, rows, {**point, **more}, (dx, du, w))
+    mixed = along(slope, "theta")
+
+    yield made("transition", point, next_x=e.next_x)
+    yield made("stage_cost", point, cost=e.stage)
+    yield made("terminal_cost", end, cost=e.terminal)
+    yield made("initial_cost", end, cost=e.initial)
+    yield made("stage_size", point, cost=_size(e.stage, z))
+    yield made("terminal_size", end, cost=_size(e.terminal, e.x))
+    yield made("expand_stage", weighed, **expand, **_blocks(hessian, n))
+    yield made("expand_terminal", weighed_end, lx=slope_end, Q=bend_end)
+    yield made("stage_theta", weighed, gradient=path_theta)
+    yield made("terminal_theta", weighed_end, gradient=last_theta)
+    yield made("initial_theta", end, gradient=first_theta)
+    of_theta = {"q": mixed[:n], "r": mixed[n:], "f": along(e.next_x, "theta")}
+    yield made("stage_mixed", f"{weighed} w", **of_theta)
+    yield made("terminal_mixed", f"{weighed_end} w", q=along(slope_end, "theta"))
+    moved = along(path_theta, "x", "u", "costate", "theta")
+    yield made("stage_along", f"{weighed} dx du dcostate w", gradient=moved)
+    yield made("terminal_along", f"{weighed_end} dx w", gradient=along(last_theta, "x", "theta"))
+    yield made("initial_along", f"{end} w", gradient=along(first_theta, "theta"))
+    sizes = problem.row_sizes
+    yield from _of_rows("fixed", s, e.fixed, sizes(e.fixed), point)
+    yield from _of_rows("line", s | {"line": e.line}, e.each, sizes(e.each), f"{point} line")
 
 
 def _of_rows(
-    name: str, rows: ca.SX, point: dict[str, ca.SX], steps: tuple[ca.SX, ca.SX, ca.SX]
+    name: str, s: dict[str, ca.SX], rows: ca.SX, sizes: ca.SX, point: str
 ) -> Iterator[ca.Function]:
     """The functions of rows h."""
-    x, u, theta, n = point["x"], point["u"], point["theta"], point["x"].numel()
-    dx, du, w = steps
-    z = ca.vertcat(x, u)
-    lam, dlam = ca.SX.sym("lam", rows.numel()), ca.SX.sym("dlam", rows.numel())
-    held = ca.dot(lam, rows)
+    n, z = s["x"].numel(), ca.vertcat(s["x"], s["u"])
+    s = s | {to: ca.SX.sym(to, rows.numel()) for to in ("lam", "dlam", "stiff", "pull")}
+    slopes, held = ca.jacobian(rows, z), ca.dot(s["lam"], rows)
+    (s["hx"], Hx), (s["hu"], Hu) = _nonzeros("hx", slopes[:, :n]), _nonzeros("hu", slopes[:, n:])
+    H, known = ca.horzcat(Hx, Hu), f"{point} lam"
+    made, along = partial(_function, s), partial(_along, s)
     hessian, slope = ca.hessian(held, z)
-    slopes = ca.jacobian(rows, z)
-    of_theta = ca.gradient(held, theta)
-    known = {**point, "lam": lam}
+    of_theta, mixed = ca.gradient(held, s["theta"]), along(slope, "theta")
     expand = {"hx": slopes[:, :n], "hu": slopes[:, n:], "px": slope[:n], "pu": slope[n:]}
-    yield _function(f"{name}_rows", point, {"h": rows})
-    yield _function(f"expand_{name}", known, expand | _blocks(hessian, n))
-    hx, Hx = _nonzeros("hx", slopes[:, :n])
-    hu, Hu = _nonzeros("hu", slopes[:, n:])
-    stiff, pull = ca.SX.sym("stiff", rows.numel()), ca.SX.sym("pull", rows.numel())
-    H, gradients = ca.horzcat(Hx, Hu), {"hx": hx, "hu": hu}
-    yield _function(
-        f"condense_{name}",
-        {"stiff": stiff, "pull": pull, **gradients},
-        {"q": Hx.T @ pull, "r": Hu.T @ pull, **_blocks(H.T @ ca.diag(stiff) @ H, n)},
-    )
-    yield _function(f"along_{name}", {**gradients, "dx": dx, "du": du}, {"h": Hx @ dx + Hu @ du})
-    yield _function(f"theta_{name}", known, {"gradient": of_theta})
-    mixed = ca.jtimes(slope, theta, w)
-    yield _function(
-        f"mixed_{name}",
-        {**known, "w": w},
-        {"q": mixed[:n], "r": mixed[n:], "h": ca.jtimes(rows, theta, w)},
-    )
-    yield _function(
-        f"along_theta_{name}",
-        {**known, "dx": dx, "du": du, "dlam": dlam, "w": w},
-        {"gradient": _along(of_theta, (x, dx), (u, du), (lam, dlam), (theta, w))},
-    )
+    condensed = {"q": Hx.T @ s["pull"], "r": Hu.T @ s["pull"]}
+    condensed |= _blocks(H.T @ ca.diag(s["stiff"]) @ H, n)
+    of_along = along(of_theta, "x", "u", "lam", "theta")
+
+    yield made(f"size_{name}", point, size=sizes)
+    yield made(f"measure_{name}", point, h=rows)
+    yield made(f"expand_{name}", known, **expand, **_blocks(hessian, n))
+    yield made(f"condense_{name}", "stiff pull hx hu", **condensed)
+    yield made(f"along_{name}", "hx hu dx du", h=Hx @ s["dx"] + Hu @ s["du"])
+    yield made(f"theta_{name}", known, gradient=of_theta)
+    yield made(f"mixed_{name}", f"{known} w", q=mixed[:n], r=mixed[n:], h=along(rows, "theta"))
+    yield made(f"along_theta_{name}", f"{known} dx du dlam w", gradient=of_along)
 
 
 def _blocks(hessian: ca.SX, n: int) -> dict[str, ca.SX]:
@@ -158,10 +154,10 @@ def _blocks(hessian: ca.SX, n: int) -> dict[str, ca.SX]:
     return {"Q": hessian[:n, :n], "S": hessian[n:, :n], "R": hessian[n:, n:]}
 
 
-def _along(of: ca.SX, *moved: tuple[ca.SX, ca.SX]) -> ca.SX:
-    """The derivative while each variable moves along its direction."""
-    variables, directions = (ca.vertcat(*part) for part in zip(*moved, strict=True))
-    return ca.jtimes(of, variables, directions)
+def _along(symbols: dict[str, ca.SX], of: ca.SX, *moved: str) -> ca.SX:
+    """The derivative while each of these symbols moves along its direction."""
+    variables = ca.vertcat(*(symbols[name] for name in moved))
+    return ca.jtimes(of, variables, ca.vertcat(*(symbols[DIRECTIONS[name]] for name in moved)))
 
 
 def _size(cost: ca.SX, z: ca.SX) -> ca.SX:
@@ -180,5 +176,8 @@ def _nonzeros(name: str, slopes: ca.SX) -> tuple[ca.SX, ca.SX]:
     return argument, found
 
 
-def _function(name: str, of: dict[str, ca.SX], results: dict[str, ca.SX]) -> ca.Function:
-    return ca.Function(name, [*of.values()], [*results.values()], [*of], [*results])
+def _function(symbols: dict[str, ca.SX], name: str, given: str, **results: ca.SX) -> ca.Function:
+    names = given.split()
+    return ca.Function(
+        name, [symbols[one] for one in names], [*results.values()], names, [*results]
+    )

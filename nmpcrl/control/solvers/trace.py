@@ -8,7 +8,6 @@ from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pandas as pd
 
@@ -29,15 +28,16 @@ def interpreted(of: Problem) -> ModuleType:
     Raises:
         CannotCompile: numba is missing.
     """
-    plain = ModuleType("riccati")
-    names = vars(plain)
     find = machine_code(of).py_func
-    solve = find.__globals__["solve"].py_func
-    for function in (solve.__globals__["iterate"].py_func, solve, find):
-        names.update(function.__globals__)
-    for name, found in list(names.items()):
-        if hasattr(found, "py_func"):
-            names[name] = FunctionType(found.py_func.__code__, names, name)
+    kernel = find.__globals__["solve"].py_func.__globals__
+    plain, model = ModuleType("riccati"), ModuleType("model")
+    for module, names in ((model, vars(kernel["model"])), (plain, find.__globals__ | kernel)):
+        own = vars(module)
+        own.update({name: one for name, one in names.items() if name not in own})
+        for name, found in names.items():
+            if hasattr(found, "py_func"):
+                own[name] = FunctionType(found.py_func.__code__, own, name)
+    vars(plain)["model"] = model
     return plain
 
 
@@ -50,74 +50,54 @@ def trace(
     curvature: bool = True,
     data: Matrix | None = None,
 ) -> pd.DataFrame:
-    """Every iterate of V_theta(s)'s first start, from the start to the answer.
+    """Every iterate of the first start of V_theta(s), from the start to the answer, a row each.
 
-    Args:
-        ocp: with u_0 free, as `Nmpc.ocp` is.
-        state: as in `Nmpc.solve`, as the next two.
-        theta: shape (2n + m + 1,), or that of a problem's theta.
-        warm_start: an earlier solution to start from.
-        curvature: False drops from the Hessian how dynamics and obstacles bend (Gauss-Newton).
-        data: of a problem, as `Problem.stage_data` gives them; its own if absent.
+    Without `curvature` the Hessian lacks that of dynamics and rows (Gauss-Newton). `ocp` is
+    `Nmpc.ocp`, `data` is from `Problem.stage_data`, the other arguments are those of `Nmpc.solve`.
 
-    Returns:
-        A row an iterate. Columns: error (of the KKT conditions, as the solver judges it), mu
-        (barrier parameter), value (of the plan, slacks included), delta (what every Q_uu got on top
-        in the step from here; nan in the last row).
+    Columns: error (of the KKT conditions, as the solver judges it), mu (barrier parameter), value
+    (of the plan, slacks included), delta (added to every Q_uu in the step from here; nan in the
+    last row).
     """
     units = Units(ocp)
     ocp, state = units.ocp, state / units.states
     warm_start = None if warm_start is None else units.inside(warm_start)
     plain = interpreted(ocp.problem)
-    known = ocp.problem.data if data is None else data
+    solve, soft = plain.solve, np.flatnonzero(ocp.problem.soft)
     rows: list[dict[str, float]] = []
-    factor: list[float] = []
+    factors: list[float] = []
+    values: list[float] = []
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
         stationarity, complementarity, largest = norms
         objective, _ = plain.measure(task, point, mu)
-        beyond, weights = (
-            np.reshape(of_rows, (-1, task.rows))[task.begin :, np.flatnonzero(ocp.problem.soft)]
-            for of_rows in (np.maximum(0, point.h), task.weights)
-        )
-        slacks = (weights * beyond).sum()
-        error, value = max(stationarity / largest, complementarity, mu), objective + slacks
+        slacks = (task.weights * np.maximum(0, point.h)).reshape(-1, task.rows)[task.begin :, soft]
+        error, value = max(stationarity / largest, complementarity, mu), objective + slacks.sum()
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
-        rows[-1]["delta"] = delta
+        if rows:  # else of the way back to the plan of a warm start
+            rows[-1]["delta"] = delta
 
-    _watch(plain, "scale", lambda size, *_: factor.append(size))
+    def first_alone(*arguments: Any) -> tuple[Any, ...]:
+        value, iterations, *_ = solve(*arguments)
+        values.append(value)
+        return 0.0, iterations, float(End.SOLVED), 0.0, 0.0
+
+    vars(plain)["solve"] = first_alone
+    _watch(plain, "scale", lambda factor, *_: factors.append(factor))
     _watch(plain, "residuals", judged)
     _watch(plain, "factorise", factorised)
     if not curvature:
         _straighten(plain)
     with np.errstate(all="ignore"):
-        _point(ocp, plain).solve(state, theta, warm_start, began=0.0, data=known)
+        Compiled(ocp, plain.find, Riccati(starts=1)).solve(
+            state, theta, warm_start, began=0.0, data=ocp.problem.data if data is None else data
+        )
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
-    iterates.loc[iterates.index[-1], "delta"] = np.nan  # not that of the look at its curvature
-    iterates["value"] = factor[-1] * iterates["value"] + _settled(ocp, state, theta, known)
+    iterates.loc[iterates.index[-1], "delta"] = np.nan  # a look at the curvature of the solution
+    iterates["value"] = values[0] + factors[0] * (iterates.value - iterates.value.iloc[-1])
     return iterates
-
-
-def _point(ocp: Ocp, plain: ModuleType) -> Compiled:
-    """The OCP with plain Python for its machine code, and its first start taken as it ends."""
-    solve = plain.solve
-
-    def taken(*arguments: Any) -> tuple[Any, ...]:
-        return (0.0, solve(*arguments)[1], float(End.SOLVED), 0.0, 0.0)
-
-    vars(plain)["solve"] = taken
-    return Compiled(ocp, plain.find, Riccati(starts=1))
-
-
-def _settled(ocp: Ocp, state: Vector, theta: Vector, data: Matrix) -> float:
-    """What the value has of the state alone."""
-    of, e = ocp.problem, ocp.problem.expressions
-    initial = ca.Function("initial", [e.x, e.theta, e.d], [e.initial])
-    which, rows, _ = ocp.settled(np.concatenate([state, theta, data.ravel()]))
-    beyond = ocp.slack_weights[which] @ np.maximum(0, rows)
-    return float(initial(state, theta, of.own(data[0]))) + float(beyond)
 
 
 def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
@@ -133,30 +113,17 @@ def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
 
 
 def _straighten(plain: ModuleType) -> None:
-    """Differentiate as if dynamics and rows were straight lines."""
-    names = vars(plain)
-    names["expand_stage"] = _without(plain.expand_stage, 5)  # costate
-    for name in ("expand_fixed", "expand_line"):
-        names[name] = _straight(names[name])
+    """Differentiate as if dynamics and rows were linear."""
+    linearise, expand_rows = plain.linearise, plain.expand_rows
 
+    def without_costates(task: Any, point: Any, duals: Any, stages: Any, costates: Matrix) -> None:
+        linearise(task, point, duals, stages, np.zeros_like(costates))
 
-def _straight(expand: Callable[..., None]) -> Callable[..., None]:
-    """What rows add to a stage but for their curvature."""
-
-    def called(*arguments: Any) -> None:
-        *_, Q, S, R = arguments[: -2 if "line" in expand.__name__ else -1]
-        before = [one.copy() for one in (Q, S, R)]
-        expand(*arguments)
-        for one, old in zip((Q, S, R), before, strict=True):
+    def gradients_alone(task: Any, x: Matrix, u: Matrix, i: int, stages: Any) -> None:
+        hessians = stages.Q[i], stages.S[i], stages.R[i]
+        before = [one.copy() for one in hessians]
+        expand_rows(task, x, u, i, stages)
+        for one, old in zip(hessians, before, strict=True):
             one[:] = old
 
-    return called
-
-
-def _without(function: Callable[..., None], *places: int) -> Callable[..., None]:
-    """The function with zeros for some of its arguments."""
-
-    def called(*arguments: Any) -> None:
-        function(*(np.zeros_like(a) if k in places else a for k, a in enumerate(arguments)))
-
-    return called
+    vars(plain).update(linearise=without_costates, expand_rows=gradients_alone)
