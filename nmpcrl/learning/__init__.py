@@ -22,7 +22,7 @@ from nmpcrl.learning.learners import (
     regularized_deep_expected_sarsa,
 )
 from nmpcrl.learning.network import QNetwork
-from nmpcrl.learning.optimisers import Descent, GaussNewton, Optimiser, TrustRegion
+from nmpcrl.learning.optimisers import Descent, GaussNewton, TrustRegion
 from nmpcrl.learning.policy_gradient import policy_gradient
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import (
@@ -44,7 +44,7 @@ from nmpcrl.learning.updates import (
 
 __all__ = [
     "Bootstrap", "Descent", "Diverged", "Episode", "Exploration", "GaussNewton", "Imitation",
-    "Learner", "NextValue", "Optimiser", "QNetwork", "Rollout", "SecondSolve", "Step", "Transition",
+    "Learner", "NextValue", "QNetwork", "Rollout", "SecondSolve", "Step", "Transition",
     "TrustRegion", "Update", "UpdateRule", "Weights", "as_gymnasium", "auxiliary_step", "batched",
     "count_episodes", "count_steps", "curvature_correction", "deep_expected_sarsa", "episodes",
     "evaluate", "expected_sarsa", "frozen", "gradient_expected_sarsa", "gradient_td_step",
