@@ -57,9 +57,12 @@ class RunClaim(Claim):
 
     def judge(self, observed: Observations) -> Verdict:
         """The verdict, by the rule of `rule`, with further numbers."""
-        answers, weaker = self.asked(observed)
         further = self.numbers and self.numbers(observed.runs, observed.paths, self.learners)
-        return replace(settle(self, answers, weaker, self.unit), numbers=further or {})
+        return replace(self.settled(observed), numbers=further or {})
+
+    def settled(self, observed: Observations) -> Verdict:
+        """The verdict without the further numbers, which take longer."""
+        return settle(self, *self.asked(observed), unit=self.unit)
 
     def asked(self, observed: Observations) -> tuple[pd.Series, pd.Series]:
         """The answers to the claim's question, and to its weaker one (else the same)."""

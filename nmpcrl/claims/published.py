@@ -172,17 +172,11 @@ class Published(Evidence):
     @cache  # noqa: B019 - one study a process
     def verdict(self, claim: str) -> Verdict:
         """The verdict on a claim, from the published data alone."""
-        return EVERY[claim].judge(self._added if claim in OWN_CLAIMS else self._main)
-
-    @cached_property
-    def _main(self) -> Observations:
+        if claim in OWN_CLAIMS:
+            return EVERY[claim].judge(Observations(self.runs[self.runs.variant.isin(FOLLOWED)]))
         found = [one["audit"] for one in self.batches if "audit" in one]
         made = assumptions.audit(AUDITED, Measurement(**found[-1])) if found else ()
-        return Observations(self.main.runs, self.paths, self.timings, made)
-
-    @cached_property
-    def _added(self) -> Observations:
-        return Observations(self.runs[self.runs.variant.isin(FOLLOWED)])
+        return EVERY[claim].judge(Observations(self.main.runs, self.paths, self.timings, made))
 
 
 def load() -> Published:

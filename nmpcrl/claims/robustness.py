@@ -14,7 +14,7 @@ import pandas as pd
 from scipy import stats
 
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import CELL, Paths, judge
+from nmpcrl.claims.rule import CELL, Observations, Paths
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -36,7 +36,8 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     `runs` have a column `variant`. `COLUMNS` come after `departure`, its letter or "".
     """
-    verdicts = judge(BY_RUNS, runs[runs.variant == MAIN_TABLE], paths)
+    main = Observations(runs[runs.variant == MAIN_TABLE], paths)
+    verdicts = [claim.settled(main) for claim in BY_RUNS.values()]
     rows = [part_changes(verdicts), variant_changes(runs, paths)]
     found = pd.concat(rows, ignore_index=True)
     found.insert(0, "departure", found.variant.map(departure))
@@ -76,9 +77,11 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     runs, rows = runs[runs.learner.isin(PAPER)], []
     for name in runs.variant[runs.variant != MAIN_TABLE].unique():
         changed = {*runs.learner[runs.variant == name]}
-        asked = {one: claim for one, claim in BY_RUNS.items() if changed & {*claim.learners}}
-        for both in zip(*(judge(asked, one, paths) for one in groups(runs, name)), strict=True):
-            rows.append(_row(name, both[0].claim, *((v.outcome, v.counts["all"]) for v in both)))
+        after, before = (Observations(one, paths) for one in groups(runs, name))
+        for claim in BY_RUNS.values():
+            if changed & {*claim.learners}:
+                both = (claim.settled(one) for one in (after, before))
+                rows.append(_row(name, claim.name, *((v.outcome, v.counts["all"]) for v in both)))
     return pd.DataFrame(rows, columns=COLUMNS)
 
 

@@ -132,7 +132,7 @@ def test_a_weaker_question_counts_in_drawn_layouts_as_it_does_in_a_to_f(overlap,
     for claim, verdict in (("C7", BY_RUNS["C7"]), ("W7", WIDER_CLAIMS["W7"])):
         assert found.loc[claim, "holding"] == 0
         assert found.loc[claim, "outcome"] == outcome
-        assert verdict.judge(Observations(runs)).outcome == outcome
+        assert verdict.settled(Observations(runs)).outcome == outcome
 
 
 def test_the_picture_is_sought_everywhere(drawn):
