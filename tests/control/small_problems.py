@@ -1,11 +1,32 @@
-"""Problems for the tests of control, which take no machine code of their own."""
+"""Problems, a plant and a task for the tests of control."""
 
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from nmpcrl.control import Hard, Parameter, Problem, Series, Soft
+from nmpcrl.control import Hard, Obstacle, Parameter, Plant, Problem, Series, Soft, Task
+
+BEHIND = {"lower": [-9, -9, -np.inf], "upper": [3, 3, np.inf]}  # the printed box: not the target's
+
+
+def plant(**changes: Any) -> Plant:
+    """Two states that are moved by one input alike."""
+    fields = {
+        "dynamics": lambda state, action: ca.vertcat(action, action),
+        "state_names": ("x", "y"), "action_names": ("a",), "lower": [-1.0], "upper": [1.0],
+    }  # fmt: skip
+    return Plant(**fields | changes)
+
+
+def task(**changes: Any) -> Task:
+    """Of the robot, with two obstacles."""
+    fields = {
+        "start": [-2.5, 1.5, 0.0], "target": [8.5, 2.0, np.pi / 2],
+        "lower": [-3.0, -3.0, -np.inf], "upper": [9.0, 9.0, np.inf],
+        "obstacles": (Obstacle(0.5, 2.2), Obstacle(3.0, 0.5)),
+    }  # fmt: skip
+    return Task(**fields | changes)
 
 
 def pendulum(**changes: Any) -> Problem:

@@ -155,31 +155,6 @@ def test_an_action_may_be_as_large_as_its_bounds():
     assert again.value == pytest.approx(plan.value)
 
 
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"horizon": 0}, "horizon = 0 must be a whole number, 1 or more"),
-        ({"horizon": True}, "horizon = True must be a whole number"),
-        ({"gamma": 0.0}, r"gamma = 0.0 must lie in \(0, 1\]"),
-        ({"gamma": np.nan}, "gamma = nan must lie in"),
-        ({"slack_weight": 0.0}, "slack_weight = 0.0 must be a positive number"),
-        ({"slack_weight": np.inf}, "slack_weight = inf must be a positive number"),
-        ({"solver": "Riccati"}, r"^solver = 'Riccati' must be one of riccati, fatrop, ipopt$"),
-        ({"solver": 3}, r"^solver = 3 must be one of riccati, fatrop, ipopt$"),
-        ({"task": None}, r"a plant needs a task: write Nmpc\(plant, task\)"),
-        (
-            {"plant": Plant(lambda s, a: s, ("x", "v"), ("u",), [-1], [1])},
-            "the task has 3 states and the plant 2",
-        ),
-        ({"plant": paper.nmpc().problem}, "a Problem has its own costs, horizon, gamma"),
-        ({"plant": paper.nmpc().problem, "task": None, "horizon": 4}, "a Problem has its own"),
-    ],
-)
-def test_a_controller_refuses_nonsense_and_says_which(changed, message):
-    with pytest.raises(ValueError, match=message):
-        Nmpc(**{"plant": differential_drive(), "task": paper.task()} | changed)
-
-
 @pytest.mark.slow
 def test_a_smaller_tolerance_buys_exactness_with_iterations(solver, draw):
     """From 1e-2 to 1e-12, both ends of what is allowed; 1e-8 is what is taken when none is said."""

@@ -1,14 +1,11 @@
 """The plant against the arc that it follows exactly."""
 
-import math
-
 import casadi as ca
 import numpy as np
 import pytest
+from small_problems import plant
 
-from nmpcrl.control import Nmpc, Plant, SolverError, Task, differential_drive
-
-BOUND = np.ones(1)
+from nmpcrl.control import Nmpc, Task, differential_drive
 
 
 def arc(state, speed, turn_rate, time):
@@ -62,41 +59,6 @@ def test_an_action_is_clipped_to_the_action_space():
     np.testing.assert_array_equal(robot.clip(np.array([-9.0, 9.0])), [-0.6, np.pi / 2])
 
 
-def plant(**changed):
-    fields = {
-        "dynamics": lambda state, action: ca.vertcat(action, action),
-        "state_names": ("x", "y"), "action_names": ("a",), "lower": -BOUND, "upper": BOUND,
-    }  # fmt: skip
-    return Plant(**fields | changed)
-
-
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"upper": np.ones(2)}, r"plant.upper = \[1. 1.\] must hold 1 numbers"),
-        ({"lower": [np.nan]}, r"plant.lower = \[nan\] must hold 1 numbers"),
-        ({"lower": BOUND}, r"plant.lower = \[1.\] must lie below plant.upper = \[1.\]"),
-        ({"period": 0.0}, r"plant.period = 0.0 must be a positive number"),
-        ({"period": np.inf}, r"plant.period = inf must be a positive number"),
-        ({"period": np.nan}, r"plant.period = nan must be a positive number"),
-        ({"state_names": ("x",)}, "dynamics returns 2 numbers; it must return 1 state"),
-        ({"substeps": 0}, r"plant.substeps = 0 must be a whole number"),
-        *(
-            ({"dynamics": wrong}, message)
-            for wrong, message in (
-                (lambda s, a: ca.vertcat(math.sin(s[0]), a), r"dynamics\[0\] holds nan.*ca.sin"),
-                (lambda s, a: [s[0]], "dynamics returns 1 numbers; it must return 2 states"),
-                (lambda s, a: s if s[0] > 0 else -s, "dynamics .* Python `if`"),
-                (lambda s: s, r"dynamics is called as dynamics\(state, action\)"),
-            )
-        ),
-    ],
-)
-def test_a_plant_refuses_nonsense_and_says_which(changed, message):
-    with pytest.raises(ValueError, match=message):
-        plant(**changed)
-
-
 def test_bounds_and_dynamics_may_be_lists():
     assert plant(lower=[-2], upper=[3]).upper.dtype == float
     one, other = (
@@ -104,17 +66,6 @@ def test_bounds_and_dynamics_may_be_lists():
         for kind in (list, lambda both: ca.vertcat(*both))
     )
     np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize("solver", ["riccati", "fatrop", "ipopt"])
-@pytest.mark.usefixtures("interpreted")
-def test_a_plant_faster_than_its_period_is_said_to_be(solver):
-    """Time constants of 1 ms sampled at 30 ms: each step multiplies a current by 30,000."""
-    motor = {"dynamics": lambda s, a: ca.vertcat((a - s[0]) / 1e-3, s[0] - s[1]), "period": 0.03}
-    task = Task([0, 0], [0, 1], [-np.inf] * 2, [np.inf] * 2, weights=[1.0, 1.0])
-    message = r"model makes 3e\+04 times as much of a small deviation in one step, .* substeps"
-    with pytest.raises(SolverError, match=message):
-        Nmpc(plant(**motor), task, solver=solver).solve(np.array([900.0, 0]), np.full(6, 1e-6))
 
 
 @pytest.mark.usefixtures("interpreted")
