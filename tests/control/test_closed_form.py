@@ -1,6 +1,6 @@
 """Riccati's recursion says what Eq. (2) must give where the plant is linear and nothing is active.
 
-All of A, B, Q, R and an offset are learned. With one stage each input is a parabola, which a bound,
+All of A, B, Q, R and an offset are learned; the plant is unstable. With one stage each input is a parabola, which a bound,
 a wall or a price cuts off.
 """
 
@@ -12,7 +12,7 @@ from nmpcrl.control import Nmpc, Problem, Soft
 from nmpcrl.control.solvers import SOLVERS
 
 GAMMA = 0.9
-A = np.array([[0.9, 0.35], [0.0, 1.1]])
+A = np.array([[0.9, 0.35], [0.0, 1.5]])
 B = np.array([[0.08, 0.3], [0.2, -0.1]])
 Q, R = np.array([[1.0, 0.2], [0.2, 0.5]]), np.diag([0.3, 0.6])
 STATE = np.array([0.7, -1.1])
@@ -20,7 +20,7 @@ STATE = np.array([0.7, -1.1])
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-@pytest.fixture(scope="module", params=[1, 6])
+@pytest.fixture(scope="module", params=[1, 6, 25])
 def linear(request) -> Problem:
     return Problem(
         states=2, inputs=2, horizon=request.param, gamma=GAMMA,

@@ -112,9 +112,7 @@ def test_between_two_discs_the_hessian_is_the_slope_of_the_gradient_where_theta_
             continue
         expected = nmpc.value_hessian_times(one, grown)
         near, far = (nmpc.solve(state, theta + k * side * grown, one).features for k in (1, 2))
-        scale = np.abs(expected).max()
-        product = nmpc.value_hessian_times(one, grown)
-        np.testing.assert_allclose(product, expected, rtol=0, atol=1e-3 * scale)
-        np.testing.assert_allclose((far - near) / side, expected, rtol=0, atol=0.03 * scale)
+        allowed = 0.03 * np.abs(expected).max()
+        np.testing.assert_allclose((far - near) / side, expected, rtol=0, atol=allowed)
         asked += 1
     assert asked > 20

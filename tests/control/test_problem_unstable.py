@@ -142,19 +142,6 @@ def test_a_pendulum_that_is_pushed_is_held_by_warm_solves_as_by_cold_ones(plant,
 
 
 @pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("horizon", [25, 50])
-@pytest.mark.parametrize("fixed", [False, True])
-def test_an_unstable_linear_plant_costs_what_riccatis_recursion_says(horizon, fixed):
-    P = 0.0
-    for _ in range(horizon - fixed):
-        P = 1 + 1.5**2 * P / (1 + P)
-    value = 1 + (1 + P * (1.5 - 1) ** 2) if fixed else P
-    problem = scalar(horizon)
-    solution = Nmpc(problem).solve([1.0], problem.theta, action=[-1.0] if fixed else None)
-    assert solution.value == pytest.approx(value, rel=1e-8)
-
-
-@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("size", [1.0, 1e4, 1e8])
 def test_a_cost_that_is_flat_at_rest_and_steep_elsewhere_is_scaled(size):
     problem = scalar(12, lambda x, u, th: th["size"] * (x**4 + u**4), bound=1.0, size=size)

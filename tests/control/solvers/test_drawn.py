@@ -59,10 +59,10 @@ def world(plant: Plant, target, lower, upper, discs, *how) -> Nmpc:
     return Nmpc(plant, task, *how)
 
 
-def like(nmpc: Nmpc, task: Task | None = None, solver: Riccati | str = "riccati") -> Nmpc:
-    """A controller with another task or solver."""
+def like(nmpc: Nmpc, solver: Riccati | str) -> Nmpc:
+    """The same controller with another solver."""
     how = nmpc.horizon, nmpc.gamma, nmpc.slack_weight
-    return Nmpc(nmpc.plant, task or nmpc.task, *how, solver=solver)
+    return Nmpc(nmpc.plant, nmpc.task, *how, solver=solver)
 
 
 def controller(rng: np.random.Generator, plant: Plant = ROBOT, longest: int = 40) -> Nmpc:
@@ -269,32 +269,6 @@ def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(
     assert restarted <= 12
 
 
-@pytest.mark.slow
-def test_values_are_ipopts_or_those_of_another_minimum():
-    """Where Ipopt finds a plan inside the box, at most 3 % are worse."""
-    compared, elsewhere, worse = 0, 0, 0
-    for layout in range(24):
-        rng = np.random.default_rng([2, layout])
-        nmpc = controller(rng, longest=10)
-        ipopt = like(nmpc, solver="ipopt")
-        for _ in range(10):
-            problem = drawn(rng, nmpc)
-            solution = problem.solve(nmpc)
-            try:
-                other = problem.solve(ipopt)
-            except SolverError:  # the state lies outside the box
-                continue
-            compared += 1
-            above = solution.value - other.value
-            if abs(above) > 1e-6 * abs(other.value) + 1e-7 * unit(problem.theta):
-                elsewhere += 1
-                worse += above > 0
-                assert above < 0 or np.abs(solution.states - other.states).max() > 1e-2
-    assert compared >= 100
-    assert elsewhere <= 0.15 * compared  # mostly better ones
-    assert worse <= 0.03 * compared
-
-
 @pytest.mark.weekly
 @pytest.mark.slow
 def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
@@ -349,31 +323,37 @@ def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
 
 @pytest.mark.weekly
 @pytest.mark.slow
-def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
-    """After a step, after a noisy one, and after a change of theta."""
-    compared, worse = 0, 0
+def test_values_are_ipopts_or_those_of_another_minimum():
+    """Cold ones; and warm ones, after a step, after a noisy one, and after a change of theta."""
+    cold, warm = [], []
     for layout in range(24):
         rng = np.random.default_rng([3, layout])
         nmpc = controller(rng, longest=10)
         ipopt = like(nmpc, solver="ipopt")
         for _ in range(8):
             state, theta = drawn_state(rng, nmpc), drawn_theta(rng, nmpc)
-            warm_start = nmpc.solve(state, theta)
-            noisy = ROBOT.clip(warm_start.action + rng.normal(scale=0.3, size=2))
-            for after, weights in (
-                (ROBOT.step(state, warm_start.action), theta),
-                (ROBOT.step(state, noisy), theta),
-                (state, theta * rng.uniform(0.95, 1.05, 9)),
+            first = nmpc.solve(state, theta)
+            noisy = ROBOT.clip(first.action + rng.normal(scale=0.3, size=2))
+            for after, weights, start in (
+                (state, theta, None),
+                (ROBOT.step(state, first.action), theta, first),
+                (ROBOT.step(state, noisy), theta, first),
+                (state, theta * rng.uniform(0.95, 1.05, 9), first),
             ):
-                try:
-                    other = ipopt.solve(after, weights, warm_start)
-                except SolverError:  # the state lies outside the box
-                    continue
-                value = nmpc.solve(after, weights, warm_start).value
-                compared += 1
-                worse += value > other.value * (1 + 1e-6) + 1e-7 * unit(weights)
-    assert compared >= 250
-    assert worse <= 0.005 * compared
+                with suppress(SolverError):  # of Ipopt: the state lies outside the box
+                    other = ipopt.solve(after, weights, start)
+                    solution = nmpc.solve(after, weights, start)
+                    above = solution.value - other.value
+                    if abs(above) <= 1e-6 * abs(other.value) + 1e-7 * unit(weights):
+                        above = 0.0
+                    apart = np.abs(solution.states - other.states).max()
+                    assert start or above <= 0 or apart > 1e-2  # elsewhere, not inexact
+                    (warm if start else cold).append(above)
+    assert len(cold) >= 80
+    assert np.not_equal(cold, 0).mean() <= 0.15  # mostly better ones
+    assert np.greater(cold, 0).mean() <= 0.03
+    assert len(warm) >= 250
+    assert np.greater(warm, 0).mean() <= 0.005
 
 
 # Whatever hypothesis thinks of
@@ -392,7 +372,6 @@ typical = st.builds(
     action=st.none(),
 )
 LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30)]
-MIRROR = np.array([1.0, -1.0, -1.0])
 
 
 @pytest.mark.slow
@@ -413,28 +392,6 @@ def test_whatever_is_asked_the_answer_is_a_solution_and_seldom_an_error():
 
     ask()
     assert failed <= 0.1 * solved
-
-
-def mirrored(nmpc: Nmpc) -> Nmpc:
-    """The same world with y for -y."""
-    task = nmpc.task
-    lower, upper = np.sort([task.lower * MIRROR, task.upper * MIRROR], axis=0)
-    target = task.target * MIRROR
-    discs = tuple(Obstacle(one.x, -one.y, one.diameter) for one in task.obstacles)
-    fields = {"start": target, "target": target, "lower": lower, "upper": upper}
-    return like(nmpc, replace(task, obstacles=discs, **fields))
-
-
-PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
-
-
-@settings(derandomize=True, deadline=None, max_examples=100)
-@given(problem=typical, pair=st.sampled_from(PAIRS))
-def test_a_mirrored_world_has_mirrored_plans(problem, pair):
-    one = problem.solve(pair[0])
-    other = problem._replace(state=problem.state * MIRROR).solve(pair[1])
-    assert other.value == pytest.approx(one.value, rel=1e-6, abs=1e-7)
-    np.testing.assert_allclose(other.states[-1] * MIRROR, one.states[-1], atol=1e-2)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)

@@ -32,12 +32,18 @@ def cold(nmpc, theta):
 @pytest.mark.parametrize("factor", [1.0, 3.0])
 def test_the_last_iterate_is_the_solution_of_the_machine_code(nmpc, theta, state, factor):
     """In a scaled problem and inside an obstacle too."""
-    weighed = np.append(factor * theta[:8], theta[8])
-    solution = nmpc.solve(np.array(state), weighed)
-    iterates = trace(nmpc.ocp, np.array(state), weighed)
+    last_is_the_solution(nmpc, np.array(state), np.append(factor * theta[:8], theta[8]))
+
+
+def last_is_the_solution(nmpc, state, theta, data=None):
+    """Hold a trace to a solve, and return both."""
+    solution = nmpc.solve(state, theta, data=data)
+    iterates = trace(nmpc.ocp, state, theta, data=nmpc.problem.stage_data(data))
     assert solution.restarts == 0
     assert len(iterates) == solution.iterations + 1
     assert iterates.value.iloc[-1] == pytest.approx(solution.value, rel=1e-9)
+    assert iterates.error.iloc[-1] < TOLERANCE < iterates.error.iloc[0]
+    return solution, iterates
 
 
 def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance(cold):
@@ -84,15 +90,9 @@ def test_a_function_that_is_replaced_is_called_by_the_others_of_its_copy_only(nm
 )
 def test_any_problem_is_traced(problem, state, data, curved):
     nmpc, state, theta = Nmpc(problem, solver=Riccati(starts=1)), np.array(state), problem.theta
-    for given in (None, data):
-        solution = nmpc.solve(state, theta, data=given)
-        known = problem.stage_data(given)
-        iterates = trace(nmpc.ocp, state, theta, data=known)
-        assert len(iterates) == solution.iterations + 1
-        assert iterates.value.iloc[-1] == pytest.approx(solution.value, rel=1e-9)
-        assert iterates.error.iloc[-1] < TOLERANCE < iterates.error.iloc[0]
-        straight = trace(nmpc.ocp, state, theta, data=known, curvature=False)
-        assert straight.value.iloc[-1] == pytest.approx(solution.value, rel=1e-6)
-        assert np.allclose(straight.value[2], iterates.value[2], rtol=1e-9) != curved
-        again = trace(nmpc.ocp, state, theta, solution, data=known)
-        assert len(again) < len(iterates)
+    solution, iterates = last_is_the_solution(nmpc, state, theta, data)
+    known = problem.stage_data(data)
+    straight = trace(nmpc.ocp, state, theta, data=known, curvature=False)
+    assert straight.value.iloc[-1] == pytest.approx(solution.value, rel=1e-6)
+    assert np.allclose(straight.value[2], iterates.value[2], rtol=1e-9) != curved
+    assert len(trace(nmpc.ocp, state, theta, solution, data=known)) < len(iterates)
