@@ -1,7 +1,7 @@
 """Riccati's recursion says what Eq. (2) must give where the plant is linear and nothing is active.
 
-All of A, B, Q, R and an offset are learned; the plant is unstable. With one stage each input is a parabola, which a bound,
-a wall or a price cuts off.
+All of A, B, Q, R and an offset are learned; the plant is unstable. With one stage each input is a
+parabola, which a bound, a wall or a price cuts off.
 """
 
 import casadi as ca

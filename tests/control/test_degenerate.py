@@ -105,7 +105,7 @@ def test_between_two_discs_the_hessian_is_the_slope_of_the_gradient_where_theta_
     theta = np.array([1.5332, 0.9758, 0.0499, 0.0497, 0.05, 1.0375, 0.9992, 0.1, 0.1834])
     grown = np.linspace(1, 2, theta.size)
     asked = 0
-    for state in rng.normal([0.7531, 1.1584, -0.7766], [0.02, 0.02, 0.05], (30, 3)):
+    for state in rng.normal([0.7531, 1.1584, -0.7766], [0.02, 0.02, 0.05], (12, 3)):
         try:
             one = nmpc.solve(state, theta)
         except SolverError:
@@ -115,4 +115,4 @@ def test_between_two_discs_the_hessian_is_the_slope_of_the_gradient_where_theta_
         allowed = 0.03 * np.abs(expected).max()
         np.testing.assert_allclose((far - near) / side, expected, rtol=0, atol=allowed)
         asked += 1
-    assert asked > 20
+    assert asked > 8

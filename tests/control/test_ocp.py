@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, Obstacle, differential_drive
+from nmpcrl.control import Nmpc, differential_drive
 from nmpcrl.control.task import Theta
 from nmpcrl.study import paper
 
@@ -102,24 +102,6 @@ def test_the_first_state_may_lie_outside_the_box(robot, theta):
     solution = robot.solve(np.array([-3.05, 2.0, 0.0]), theta)
     assert solution.states[0, 0] == pytest.approx(-3.05)
     assert solution.states[1, 0] >= -3
-
-
-@pytest.mark.parametrize(("count", "omega"), [(0, 100.0), (1, 250.0), (7, 100.0)])
-def test_any_number_of_obstacles_is_counted_at_stage_zero(
-    point_mass, open_field, solver, count, omega
-):
-    """A mass that leaves the obstacles before stage 1 pays omega (Xi + theta_c) for each, once."""
-    obstacles = tuple(Obstacle(0.0, -0.05 * k) for k in range(count))
-    theta = np.array([1.0, 1.0, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 0.1, 0.1, 0.02])
-    state = np.array([1.1, -0.4, 9.0, -9.0])
-    free = Nmpc(point_mass(), open_field(), solver=solver).solve(state, theta)
-    nmpc = Nmpc(point_mass(), open_field(obstacles), solver=solver, slack_weight=omega)
-    solution = nmpc.solve(state, theta)
-    beyond = nmpc.task.overlap(state) + theta[-1]
-    assert (beyond > 0).all()
-    assert solution.slacks.shape == (11, count)
-    assert solution.value == pytest.approx(free.value + omega * beyond.sum(), rel=1e-7)
-    assert solution.features[-1] == pytest.approx(omega * count, abs=1e-4)
 
 
 def test_bellmans_equation_ties_one_horizon_to_the_next(robot, draw, solver):

@@ -17,21 +17,6 @@ def arc(state, speed, turn_rate, time):
     return np.array([x + radius * along, y - radius * across, later])
 
 
-def simulated(period, state, action, time):
-    plant = differential_drive(period)
-    for _ in range(round(time / period)):
-        state = plant.step(state, action)
-    return state
-
-
-def test_runge_kutta_converges_to_the_arc_with_order_four():
-    state, action, time = np.array([-2.5, 1.5, 0.4]), np.array([0.6, 1.5]), 1.6
-    exact = arc(state, *action, time)
-    errors = [np.abs(simulated(h, state, action, time) - exact).max() for h in (0.4, 0.2, 0.1)]
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    np.testing.assert_allclose(orders, 4, atol=0.15)
-
-
 def test_runge_kutta_is_the_exponentials_series_up_to_the_fourth_power():
     """On x' = a x every one of the four slopes differs; the step must be 1 + z + ... + z^4 / 24."""
     growth = plant(dynamics=lambda state, action: action * state, period=0.5)

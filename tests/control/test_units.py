@@ -111,9 +111,13 @@ def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver,
         soft=[Soft(lambda x, u, th: unit * (th["m"] - (u if given else x / size)),
                    weight=10.0 / unit, stages=[0])],
     )  # fmt: skip
-    for active in (False, True):
-        nmpc = Nmpc(problem, solver=solver, ties_active=active)
-        for beyond, price in ((1e-4, 10.0), (0.0, 10.0 * active), (-1e-4, 0.0)):
-            start = np.array([0.5 - beyond])
-            found = nmpc.solve(size * start, problem.theta, action=start if given else None)
+    nmpcs = [Nmpc(problem, solver=solver, ties_active=active) for active in (False, True)]
+    for beyond, prices in ((1e-4, (10.0, 10.0)), (0.0, (0.0, 10.0)), (-1e-4, (0.0, 0.0))):
+        start = np.array([0.5 - beyond])
+        asked = size * start, problem.theta, None, start if given else None
+        one, other = (nmpc.solve(*asked) for nmpc in nmpcs)
+        assert one.value == other.value
+        np.testing.assert_array_equal(one.primal, other.primal)
+        for nmpc, found, price in zip(nmpcs, (one, other), prices, strict=True):
             assert found.features == pytest.approx(price)
+            assert nmpc.kkt_residual(found, relative=True) < 1e-6

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, Obstacle, Problem, Soft, SolverError, Status, differential_drive
+from nmpcrl.control import Nmpc, Problem, Soft, SolverError, Status, differential_drive
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
@@ -77,31 +77,6 @@ def test_a_solution_of_any_solver_is_a_warm_start_for_any_other(
         inside = np.clip(after, robot.task.lower, robot.task.upper)
         assert robot.kkt_residual(robot.solve(inside, theta, warm_start, then)) < 1e-4
     assert same >= 5
-
-
-def beside(solver, **options):
-    """A controller that starts on the boundary of two obstacles in one place."""
-    radius = 1.25 * np.sqrt(1.1)
-    start = np.array([2 + radius * np.cos(0.3), 2 + radius * np.sin(0.3), 0.3])
-    task = replace(paper.task(), start=start, obstacles=(Obstacle(2.0, 2.0),) * 2)
-    return Nmpc(differential_drive(), task, solver=solver, **options)
-
-
-def test_on_a_boundary_the_features_are_the_lower_slope_of_a_kink_or_with_ties_the_upper(solver):
-    """V has a kink in theta_c there, of omega an obstacle; value and plan have none."""
-    theta, step = np.append(paper.THETA_INIT[:8], 0.1), np.append(np.zeros(8), 1e-4)
-    outside, inside = (beside(solver, ties_active=active) for active in (False, True))
-    one, other = (nmpc.solve(nmpc.task.start, theta) for nmpc in (outside, inside))
-    above, below = (outside.solve(one.state, theta + d, one).value for d in (step, -step))
-    assert (one.value - below) / 1e-4 == pytest.approx(one.features[-1], abs=0.2)
-    assert (above - one.value) / 1e-4 == pytest.approx(other.features[-1], abs=0.2)
-    assert other.features[-1] == pytest.approx(one.features[-1] + 2 * OMEGA, rel=1e-9)
-    assert other.value == one.value
-    np.testing.assert_array_equal(other.primal, one.primal)
-    np.testing.assert_array_equal(other.multipliers.obstacles[0], OMEGA)
-    np.testing.assert_array_equal(other.multipliers.slacks[0], 0)
-    for nmpc, found in ((outside, one), (inside, other)):
-        assert nmpc.kkt_residual(found) < 1e-4
 
 
 @of_casadi
