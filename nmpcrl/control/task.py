@@ -85,7 +85,7 @@ class Task(Described):
         for name in ("start", "target", "lower", "upper", "weights"):
             value = spread(f"task.{name}", getattr(self, name), shape, "a state")
             object.__setattr__(self, name, value)
-        box("task.", self.lower, self.upper, len(self.start), "a state")
+        box("task.", self.lower, self.upper, self.start.size, "a state")
         for name in ("robot_diameter", "near", "margin", "penalty"):
             if not 0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"task.{name} = {getattr(self, name)} must be 0 or more")
@@ -101,8 +101,8 @@ class Task(Described):
         if not np.isfinite(point).all():
             raise ValueError(f"task.{name} = {point} must be finite")
         for i in np.flatnonzero((point < self.lower) | (point > self.upper)):
-            box = f"[{self.lower[i]:g}, {self.upper[i]:g}]"
-            raise ValueError(f"{name} {np.round(point, 2)} is outside the box {box} in state {i}")
+            sides = f"[{self.lower[i]:g}, {self.upper[i]:g}]"
+            raise ValueError(f"{name} {np.round(point, 2)} is outside the box {sides} in state {i}")
 
     def problem(self, plant: Plant, horizon: int, gamma: float, slack_weight: float) -> Problem:
         """Eq. (2): theta holds x, u and f, the square roots of the weights, and c of Eq. (2f).

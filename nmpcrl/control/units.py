@@ -13,19 +13,19 @@ from nmpcrl.control.solution import Solution
 
 
 class Units:
-    """An OCP and the one that is solved in its place, `ocp`: itself if `own`, where units are 1."""
+    """An OCP and the one that is solved in its place, `ocp`; the same where units are `trivial`."""
 
     def __init__(self, ocp: Ocp) -> None:
         self._outer, self.ocp, solved = ocp, ocp, ocp.problem.solved
         self.states, self.inputs = ocp.problem.sizes
-        self.own = solved is ocp.problem
-        if not self.own:
+        self.trivial = solved is ocp.problem
+        if not self.trivial:
             fixed = ocp.fixed_action.size > 0
             self.ocp = transcribe(solved, fix_action=fixed, ties_active=ocp.ties_active)
 
     def inside(self, solution: Solution) -> Solution:
         """A solution in the units of `ocp`."""
-        if self.own:
+        if self.trivial:
             return solution
         return replace(
             solution,

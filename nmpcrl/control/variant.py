@@ -23,12 +23,12 @@ class Variant:
     def __init__(self, ocp: Ocp, solver: Solver) -> None:
         self.ocp, self.units = ocp, Units(ocp)
         self.solver = solver.prepare(self.units.ocp)
-        self.solve = self.solver.solve if self.units.own else self._solve_in_units
+        self.solve = self.solver.solve if self.units.trivial else self._solve_in_units
 
     @property
     def machine(self) -> Compiled | None:
         """The compiled solver; None where another one solves, or where units are not 1."""
-        return self.solver if self.units.own and isinstance(self.solver, Compiled) else None
+        return self.solver if self.units.trivial and isinstance(self.solver, Compiled) else None
 
     def _solve_in_units(
         self,
