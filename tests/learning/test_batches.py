@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from learning.small_runs import noise, run
+from scipy.optimize import lsq_linear
 
 from nmpcrl.learning import (
     Descent,
@@ -74,6 +75,10 @@ def test_lstd_q_fits_a_linear_value_to_its_targets_in_one_step(controller):
     target = [step.cost + 0.9 * step.next_state @ THETA for step in steps]
     fitted = after(lstd_q(controller, regularisation=1e-10), steps)
     np.testing.assert_allclose(fitted, np.linalg.lstsq(phi, target)[0], rtol=1e-6)
+    bounds = THETA - 0.7, THETA + 0.7
+    bounded = after(lstd_q(controller, regularisation=1e-10, bounds=bounds), steps)
+    np.testing.assert_allclose(bounded, lsq_linear(phi, target, bounds).x, rtol=1e-6)
+    assert not np.allclose(bounded, np.clip(fitted, *bounds))
     scale = np.array([1.0, 0.5, 2.0])
     trusted = after(lstd_q(controller, optimiser=TrustRegion(0.1, scale)), steps)
     assert np.linalg.norm((trusted - THETA) / scale) == pytest.approx(0.1)

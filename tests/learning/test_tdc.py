@@ -1,8 +1,5 @@
 """Exact nonlinear gradient TD: it descends the projected Bellman error, and Eq. (16) does not."""
 
-from dataclasses import dataclass
-from functools import partial
-
 import numpy as np
 import pytest
 from learning.small_runs import differences
@@ -55,61 +52,51 @@ def test_theta_is_projected_and_w_is_not(quadratic, transition, weights, curvatu
     assert bool(quadratic.products) == curvature
 
 
-@dataclass
 class Process:
-    """A Markov chain with costs, visited so often in each state."""
+    """A Markov chain of six states in three dimensions: features cannot fit all Bellman errors."""
 
-    states: np.ndarray  # one row a state, shape (S, n)
-    P: np.ndarray  # P[i, j], how likely j follows i, shape (S, S)
-    costs: np.ndarray  # shape (S,)
-    visits: np.ndarray  # shape (S,), sums to 1
+    def __init__(self, seed):
+        rng = np.random.default_rng(seed)
+        self.states = rng.normal(size=(6, 3))
+        self.P = rng.dirichlet(np.ones(6), size=6)  # P[i, j], how likely j follows i
+        self.costs = rng.uniform(0, 3, 6)
+        self.visits = rng.dirichlet(np.full(6, 5.0))  # share of each state
 
     def expected_step(self, learner, controller, weights):
-        """The mean of a learner's step over all transitions."""
-        theta, w = np.zeros_like(weights.theta), np.zeros_like(weights.w)
-        for i, state in enumerate(self.states):
+        """theta and w after the mean of a learner's step over all transitions."""
+        moved = []
+        for state, cost in zip(self.states, self.costs, strict=True):
             solution = controller.solve(state, weights.theta)
-            for j in np.flatnonzero(self.P[i]):
-                step = Transition(state, np.zeros(2), self.costs[i], self.states[j], solution)
-                moved = learner.step(weights, step).weights
-                theta += self.visits[i] * self.P[i, j] * moved.theta
-                w += self.visits[i] * self.P[i, j] * moved.w
-        return Weights(theta, w)
+            for after in self.states:
+                step = learner.step(weights, Transition(state, None, cost, after, solution))
+                moved.append([step.weights.theta, step.weights.w])
+        return np.average(moved, axis=0, weights=np.ravel(self.visits[:, None] * self.P))
 
     def fit(self, controller, theta):
-        """The least-squares fit of the features to the Bellman errors: its weights and itself."""
+        """Weights of the least-squares fit of features to Bellman errors, and its size: Eq. (14).
+
+        The projection is on the tangent space of the value in theta.
+        """
         values = np.array([controller.value(state, theta) for state in self.states])
         features = np.array([controller.features(state, theta) for state in self.states])
-        errors = self.costs + controller.gamma * self.P @ values - values
-        root = np.sqrt(self.visits)
+        errors, root = (
+            self.costs + controller.gamma * self.P @ values - values,
+            np.sqrt(self.visits),
+        )
         w = np.linalg.lstsq(root[:, None] * features, root * errors, rcond=None)[0]
-        return w, features @ w
-
-    def projected_bellman_error(self, controller, theta):
-        """Eq. (14), with the projection on the value's tangent space in theta: from definition."""
-        _, projected = self.fit(controller, theta)
-        return self.visits @ projected**2
-
-
-def drawn_process(seed):
-    """Six states in three dimensions, so that the features cannot fit every Bellman error."""
-    rng = np.random.default_rng(seed)
-    parts = rng.normal(size=(6, 3)), rng.dirichlet(np.ones(6), size=6), rng.uniform(0, 3, 6)
-    return Process(*parts, rng.dirichlet(np.full(6, 5.0)))
+        return w, self.visits @ (features @ w) ** 2
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_with_w_at_its_best_theta_descends_the_projected_bellman_error(quadratic, weights, seed):
     """Maei et al. (2009): the expected step is minus half the gradient; Eq. (16) misses it."""
-    process, theta = drawn_process(seed), weights.theta
+    process, theta = Process(seed), weights.theta
     w, _ = process.fit(quadratic, theta)
     tdc, printed = (
         process.expected_step(make(quadratic, 1.0, 1.0), quadratic, Weights(theta, w))
         for make in (gradient_tdc, gradient_expected_sarsa)
     )
-    errors = partial(process.projected_bellman_error, quadratic)
-    descent = -differences(errors, theta, 1e-5) / 2
-    np.testing.assert_allclose(tdc.theta - theta, descent, rtol=1e-6, atol=1e-7)
-    np.testing.assert_allclose(tdc.w, w, atol=1e-12)  # w has nothing left to learn
-    missed = np.linalg.norm(printed.theta - theta - descent)
-    assert missed > 0.02 * np.linalg.norm(descent)
+    descent = -differences(lambda theta: process.fit(quadratic, theta)[1], theta, 1e-5) / 2
+    np.testing.assert_allclose(tdc[0] - theta, descent, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(tdc[1], w, atol=1e-12)  # w has nothing left to learn
+    assert np.linalg.norm(printed[0] - theta - descent) > 0.02 * np.linalg.norm(descent)
