@@ -170,7 +170,7 @@ def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
     assert (found.status, found.solver) == (Status.TAKEN_OVER, "fatrop")
     assert found.value == pytest.approx(best.value, rel=1e-6)
     policy = nmpc.policy_jacobian(best)
-    monkeypatch.setattr("nmpcrl.control.solvers.riccati.slopes_code", None)
+    monkeypatch.setattr(code, "slopes", None)
     np.testing.assert_allclose(nmpc.policy_jacobian(found), policy, atol=1e-5)
 
 

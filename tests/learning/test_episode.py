@@ -179,7 +179,7 @@ def test_without_a_derivative_of_the_plan_dense_algebra_answers_in_both(monkeypa
     ):  # fmt: skip
         return False
 
-    monkeypatch.setattr(riccati, "slopes_code", lambda _: slopes)
+    monkeypatch.setattr(riccati.Compiled, "slopes", property(lambda _: slopes))
     assert_same(MAKE["TDC"], paper.nmpc(), noise(steps=5))
 
 

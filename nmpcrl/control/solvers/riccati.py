@@ -59,30 +59,20 @@ class Arguments(NamedTuple):
     tie: float
 
 
-def machine_code(problem: Problem) -> Any:
-    """`find.find` compiled for a problem.
+def machine_code(problem: Problem, entry: str = "find") -> Any:
+    """The function `find.find`, or `slopes.slopes`, compiled for a problem once.
 
     Raises:
         CannotCompile: numba is missing, or the problem holds an operation that is not known.
     """
-    return _loaded("find", problem, NOTICE)
-
-
-def slopes_code(problem: Problem) -> Any:
-    """`slopes.slopes` compiled for a problem."""
-    return _loaded("slopes", problem, PLAN_NOTICE)
-
-
-def _loaded(entry: str, problem: Problem, notice: str) -> Any:
-    """The function of a module that has its name, compiled with a model once for a problem."""
-    if entry in problem.machine_code:
-        return problem.machine_code[entry]
-    texts = {
-        "__init__": f"from .{entry} import {entry}\n",
-        "model": stages.write(problem),
-        **{name: TEXTS[name] for name in ("codes", "kernel", entry)},
-    }
-    problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
+    if entry not in problem.machine_code:
+        texts = {
+            "__init__": f"from .{entry} import {entry}\n",
+            "model": stages.write(problem),
+            **{name: TEXTS[name] for name in ("codes", "kernel", entry)},
+        }
+        notice = NOTICE if entry == "find" else PLAN_NOTICE
+        problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
     return problem.machine_code[entry]
 
 
@@ -92,9 +82,7 @@ class Riccati(Solver):
 
     name: ClassVar[str] = "riccati"
     code: Callable[[Problem], Any] = field(default=machine_code, repr=False)
-    starts: int = (
-        SEVERAL  # cold ones, of which the best plan counts; if several, another by feedback
-    )
+    starts: int = SEVERAL  # cold ones; if several, another is held by feedback, and the best counts
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -226,7 +214,7 @@ class Compiled:
     @cached_property
     def slopes(self) -> Any:
         """`slopes.slopes`, compiled."""
-        return slopes_code(self._problem)
+        return machine_code(self._problem, "slopes")
 
     @property
     def place(self) -> int:
