@@ -19,6 +19,7 @@ from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
+from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.solvers import Fatrop, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
@@ -148,12 +149,14 @@ class Nmpc(Described):
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
-        return self._variant(solution).hessian(solution)
+        found: Matrix = self._variant(solution).dense(Sensitivity.hessian, solution)
+        return found
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """`value_hessian` times a vector of shape (d,); in microseconds by riccati."""
         vector = _checked("vector", vector, solution.theta.size, self.largest)
-        return self._variant(solution).hessian_times(solution, vector)
+        product = self._variant(solution).compiled(Compiled.hessian_times, solution, vector)
+        return self.value_hessian(solution) @ vector if product is None else product
 
     def policy_jacobian(self, solution: Solution) -> Matrix:
         """du_0 / dtheta, shape (m, d): how the policy answers to theta; 0 where u_0 is given.
@@ -162,18 +165,27 @@ class Nmpc(Described):
         policy has a kink, it lies between the derivatives of the two sides; where more is reached
         than the inputs can follow, it is that of the side to which theta grows: see `Sensitivity`.
         """
-        return self._variant(solution).policy(solution)
+        variant = self._variant(solution)
+        found: Matrix | None = variant.compiled(Compiled.policy, solution)
+        if found is None:
+            found = variant.dense(Sensitivity.plan, solution)[variant.ocp.inputs[0]]
+        return variant.units.inputs[:, None] * found
 
     def policy_feedback(self, solution: Solution) -> Matrix:
         """du_0 / ds, shape (m, n): how the policy answers to the state; 0 where u_0 is given."""
-        return self._variant(solution).feedback(solution)
+        variant = self._variant(solution)
+        found: Matrix | None = variant.compiled(Compiled.feedback, solution)
+        if found is None:
+            found = variant.dense(Sensitivity.plan, solution, in_state=True)[variant.ocp.inputs[0]]
+        return variant.units.inputs[:, None] * found / variant.units.states
 
     def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.
 
         `relative` to the sizes of the plan and of its multipliers, whatever their units.
         """
-        return self._variant(solution).kkt_residual(solution, relative=relative)
+        variant = self._variant(solution)
+        return float(variant.dense(Sensitivity.kkt_residual, solution, relative=relative))
 
     @property
     def key(self) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.control.diagnosis import Diagnosis
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
@@ -48,46 +48,28 @@ class Variant:
             raise type(error)(error.status, state, theta) from None
         return units.outside(found, state)
 
-    def kkt_residual(self, solution: Solution, *, relative: bool) -> float:
-        """As `Nmpc.kkt_residual`."""
-        point = _point(self.units.inside(solution))
-        return self._sensitivity.kkt_residual(*point, relative=relative)
-
-    def hessian(self, solution: Solution) -> Matrix:
-        """As `Nmpc.value_hessian`."""
-        return self._dense(self._sensitivity.hessian, solution)
-
-    def hessian_times(self, solution: Solution, vector: Vector) -> Vector:
-        """As `Nmpc.value_hessian_times`."""
-        product = self._compiled(Compiled.hessian_times, solution, vector)
-        return self.hessian(solution) @ vector if product is None else product
-
-    def policy(self, solution: Solution) -> Matrix:
-        """As `Nmpc.policy_jacobian`."""
-        found: Matrix | None = self._compiled(Compiled.policy, solution)
-        if found is None:
-            found = self._dense(self._sensitivity.plan, solution)[self.ocp.inputs[0]]
-        return self.units.inputs[:, None] * found
-
-    def feedback(self, solution: Solution) -> Matrix:
-        """As `Nmpc.policy_feedback`."""
-        found: Matrix | None = self._compiled(Compiled.feedback, solution)
-        if found is None:
-            found = self._dense(self._in_state.plan, solution)[self.ocp.inputs[0]]
-        return self.units.inputs[:, None] * found / self.units.states
-
-    def _compiled(
+    def compiled(
         self, derivative: Callable[..., Vector | None], solution: Solution, *along: Vector
     ) -> Any:
-        """A derivative by the compiled solver; None where it has none."""
+        """A derivative by the compiled solver, in units of `units`; None where it has none."""
         if not isinstance(self.solver, Compiled):
             return None
         return derivative(self.solver, self.units.inside(solution), *along)
 
-    def _dense(self, derivative: Callable[..., Matrix], solution: Solution) -> Matrix:
-        """A derivative by `Sensitivity`; DerivativeError where it has none."""
+    def dense(
+        self,
+        function: Callable[..., Any],
+        solution: Solution,
+        *,
+        in_state: bool = False,
+        **how: Any,
+    ) -> Any:
+        """A function of `Sensitivity`, in theta or `in_state`; DerivativeError if there is none."""
+        inside = self.units.inside(solution)
+        duals = inside.constraint_duals, inside.bound_duals
+        of = self._in_state if in_state else self._sensitivity
         try:
-            return derivative(*_point(self.units.inside(solution)))
+            return function(of, inside.primal, inside.parameters, *duals, **how)
         except np.linalg.LinAlgError as error:
             raise DerivativeError(str(error), solution.state, solution.theta) from error
 
@@ -104,9 +86,3 @@ class Variant:
         """Derivatives in the initial state in place of theta."""
         ocp = self.units.ocp
         return Sensitivity(replace(ocp, theta=ocp.parameters[: ocp.problem.states]))
-
-
-def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:
-    return (
-        solution.primal, solution.parameters, solution.constraint_duals, solution.bound_duals,
-    )  # fmt: skip
