@@ -1,13 +1,12 @@
-"""Two plants and drawn problems for the tests of control."""
+"""The paper's controller with each solver, and drawn problems of it."""
 
 from collections.abc import Callable, Iterator
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Obstacle, Plant, Task
+from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
@@ -63,37 +62,3 @@ def draw() -> Draw:
                 yield state, theta
 
     return problems
-
-
-@pytest.fixture(scope="session")
-def point_mass() -> Callable[..., Plant]:
-    """A mass that is pushed about the plane: linear, so that RK4 is exact."""
-
-    def build(bound: float = 1e3) -> Plant:
-        return Plant(
-            dynamics=lambda state, action: ca.vertcat(state[2:], action),
-            state_names=("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
-            action_names=("a_x [m/s2]", "a_y [m/s2]"),
-            lower=np.full(2, -bound),
-            upper=np.full(2, bound),
-        )
-
-    return build
-
-
-@pytest.fixture(scope="session")
-def open_field() -> Callable[..., Task]:
-    """A task of the point mass whose obstacles and walls are wherever the test puts them."""
-
-    def build(obstacles: tuple[Obstacle, ...] = (), box: float = 1e3, **fields) -> Task:
-        return Task(
-            start=np.zeros(4),
-            target=np.array([1.0, -2.0, 0.0, 0.0]),
-            lower=np.full(4, -box),
-            upper=np.full(4, box),
-            obstacles=obstacles,
-            weights=np.ones(4),
-            **fields,
-        )
-
-    return build

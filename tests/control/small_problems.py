@@ -29,6 +29,21 @@ def task(**changes: Any) -> Task:
     return Task(**fields | changes)
 
 
+def point_mass(bound: float = 1e3) -> Plant:
+    """A mass that is pushed about the plane: linear, so that RK4 is exact."""
+    return Plant(
+        dynamics=lambda state, action: ca.vertcat(state[2:], action),
+        state_names=("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
+        action_names=("a_x [m/s2]", "a_y [m/s2]"), lower=[-bound] * 2, upper=[bound] * 2,
+    )  # fmt: skip
+
+
+def open_field(box: float = 1e3, **changes: Any) -> Task:
+    """A task of the point mass."""
+    target = [1.0, -2.0, 0.0, 0.0]
+    return Task([0.0] * 4, target, [-box] * 4, [box] * 4, weights=[1.0] * 4, **changes)
+
+
 def pendulum(**changes: Any) -> Problem:
     """A curved plant with everything that a problem may have; each symbol is learned."""
     fields = {

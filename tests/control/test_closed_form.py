@@ -7,6 +7,7 @@ parabola, which a bound, a wall or a price cuts off.
 import casadi as ca
 import numpy as np
 import pytest
+from small_problems import open_field, point_mass
 
 from nmpcrl.control import Nmpc, Problem, Soft
 from nmpcrl.control.solvers import SOLVERS
@@ -113,7 +114,7 @@ def axis(state, target, theta, k: int) -> tuple[float, float, np.ndarray]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_an_input_at_its_bound_is_the_clipped_minimum(point_mass, open_field, solver, seed):
+def test_an_input_at_its_bound_is_the_clipped_minimum(solver, seed):
     rng = np.random.default_rng(seed)
     state, theta = rng.normal(scale=3, size=4), rng.uniform(0.3, 2, 11)
     nmpc = Nmpc(point_mass(bound=0.3), open_field(), horizon=1, gamma=GAMMA, solver=solver)
@@ -130,7 +131,7 @@ def test_an_input_at_its_bound_is_the_clipped_minimum(point_mass, open_field, so
 
 
 @pytest.mark.parametrize("omega", [None, 0.1, 3.0, 100.0])
-def test_a_wall_holds_a_state_back_as_far_as_it_costs(point_mass, open_field, solver, omega):
+def test_a_wall_holds_a_state_back_as_far_as_it_costs(solver, omega):
     """A hard wall of the speed at 2.5, or one whose price is the slope beyond it."""
     price = {} if omega is None else {"slack_weight": omega}
     task, state = open_field(box=2.5, soft_box=omega is not None), np.array([-2.4, -2, 2.3, 0.0])

@@ -9,7 +9,7 @@ import pytest
 from differences import active, agrees
 from small_problems import drawn, limited, pendulum, tank
 
-from nmpcrl.control import Fatrop, Ipopt, Nmpc, Problem, Riccati
+from nmpcrl.control import Ipopt, Nmpc, Problem, Riccati
 from nmpcrl.study import paper
 from nmpcrl.study.problems import gros_zanon
 
@@ -104,13 +104,3 @@ def test_values_and_all_derivatives_are_those_of_ipopt_and_of_differences(name, 
         np.testing.assert_allclose(ours.slacks, theirs.slacks, atol=1e-4)
         compared += 1
     assert compared >= case.compared
-
-
-def test_a_solver_of_casadi_has_the_same_derivatives_from_its_own_solutions():
-    for solver in (Ipopt(1e-11), Fatrop(1e-10)):
-        nmpc = paper.nmpc(solver=solver)
-        compared = [
-            agrees(nmpc, nmpc.solve(state, theta, **given), 1e-3, 1e-4, **given)
-            for state, theta, given in asked(CASES["the robot"], nmpc)
-        ]
-        assert sum(compared) >= 6

@@ -5,7 +5,6 @@ import pytest
 from differences import agrees
 
 from nmpcrl.control import Nmpc, Obstacle, Plant, Riccati, Task, differential_drive
-from nmpcrl.control import nmpc as module
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
@@ -96,17 +95,6 @@ def test_horizon_and_number_of_obstacles_are_values(solver, horizon, count):
     assert solver != "riccati" or agrees(nmpc, solution, 1e-4)
 
 
-@pytest.fixture
-def unreached(monkeypatch) -> Nmpc:
-    """A controller that must not get as far as a solver."""
-
-    def transcribe(*_, **__):
-        raise AssertionError("the arguments reached the solver")
-
-    monkeypatch.setattr(module, "transcribe", transcribe)
-    return paper.nmpc()
-
-
 def put(name, index, number):
     """The arguments of a solve, one of whose numbers is another."""
     arguments = {"state": START.copy(), "theta": THETA.copy(), "action": np.zeros(2)}
@@ -135,11 +123,9 @@ ABSURD = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf, r"(e\+07|10000000)": 1e
         ({"data": {"wind": 1.0}}, r"data has no 'wind' \(it has target, discs\)"),
     ],
 )  # fmt: skip
-def test_arguments_that_are_none_are_refused_before_a_solver_sees_them(
-    unreached, arguments, message
-):
+def test_arguments_that_are_none_are_refused(fatrop, arguments, message):
     with pytest.raises(ValueError, match=message) as caught:
-        unreached.solve(**{"state": START, "theta": THETA} | arguments)
+        fatrop.solve(**{"state": START, "theta": THETA} | arguments)
     assert "\n" not in str(caught.value)
 
 

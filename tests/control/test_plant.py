@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from small_problems import plant
+from small_problems import plant, point_mass
 
 from nmpcrl.control import Nmpc, Task, differential_drive
 
@@ -27,7 +27,7 @@ def test_runge_kutta_is_the_exponentials_series_up_to_the_fourth_power():
     )
 
 
-def test_a_step_is_a_fifth_of_a_second_on_an_arc_a_line_or_a_parabola(point_mass):
+def test_a_step_is_a_fifth_of_a_second_on_an_arc_a_line_or_a_parabola():
     state, action = np.array([1.0, 2.0, -0.7]), np.array([0.5, -1.0])
     stepped = differential_drive().step(state, action)
     np.testing.assert_allclose(stepped, arc(state, *action, 0.2), atol=1e-6)

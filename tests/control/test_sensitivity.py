@@ -8,6 +8,7 @@ import pytest
 from differences import agrees
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from small_problems import open_field, point_mass
 
 from nmpcrl.control import Nmpc, Obstacle, Riccati, Task, differential_drive
 from nmpcrl.study import paper
@@ -66,9 +67,7 @@ def test_the_slack_of_stage_zero_is_straight_on_either_side_of_its_kink(radius):
     assert radius > 1 or agrees(outside, outside.solve(start, theta), 1e-4)
 
 
-def test_at_a_bound_that_is_just_reached_the_curvature_lies_between_its_sides(
-    point_mass, open_field
-):
+def test_at_a_bound_that_is_just_reached_the_curvature_lies_between_its_sides():
     """An input free to follow theta bends V down; one that is held does not."""
     theta = np.array([1.2, 0.7, 0.3, 0.2, 0.4, 0.9, 1.5, 2.0, 0.6, 0.8, 0.0])
     state, along = np.array([0.9, -1.5, 0.0, 0.0]), np.linspace(0.5, 1.5, 11)
