@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, Problem, Riccati, Series, Soft, SolverError, Status, rk4
+from nmpcrl.control import Nmpc, Problem, Riccati, SolverError, Status, rk4
 from nmpcrl.control.solvers.codes import End
 
 PERIOD = 0.1  # s
@@ -57,31 +57,12 @@ def cart_pole(horizon: int) -> Problem:
     )  # fmt: skip
 
 
-def among_moving_discs() -> Problem:
-    """The robot on its way to (5, 0) while two discs cross it."""
-    i = np.arange(21.0)[:, None]
-    discs = np.stack([np.hstack([2 + 0.1 * i, 0 * i + 0.2]),
-                      np.hstack([3.5 - 0.15 * i, 0.05 * i - 0.5])], axis=1)  # fmt: skip
-    return Problem(
-        states=3, inputs=2, horizon=20, gamma=0.97, lower=[-1.0, -1.5], upper=[1.0, 1.5],
-        theta={"q": np.array([1.0, 1.0, 0.1]), "c": 0.0}, data={"discs": Series(discs)},
-        model=lambda x, u, th: rk4(
-            lambda x, u: ca.vertcat(u[0] * ca.cos(x[2]), u[0] * ca.sin(x[2]), u[1]), x, u, 0.2
-        ),
-        stage=lambda x, u, th: ca.dot(th["q"], (x - ca.DM([5, 0, 0])) ** 2) + ca.sumsqr(u) / 10,
-        soft=[Soft(lambda x, u, th, d: 1 - ca.sumsqr(x[:2] - d["discs"]) / 0.64 + th["c"],
-                   weight=100.0, each="discs")],
-    )  # fmt: skip
-
-
 ANGLES = [(a, w) for a in (-0.4, -0.2, 0.05, 0.3) for w in (-0.3, 0.0, 0.3)]
 NEAR = [(p, a, 0.0, w) for p in (-0.5, 0.5) for a in (-0.3, 0.1) for w in (0.0, 0.5)]
 HANGING = [(p, np.pi + a, 0.0, w) for p in (-0.5, 0.0) for a in (-0.3, 0.01) for w in (0.0, 0.5)]
-FREE = [(-1.0, 0.2, 0.0), (0.5, 1.5, -1.0), (1.0, -0.8, 2.0), (1.2, 0.3, 0.1), (-0.5, -0.6, -2.0)]
 HELD = {
     **{f"pendulum {N}": (pendulum(N), ANGLES) for N in (1, 10, 30, 60, 100)},
     **{f"cart-pole {N}": (cart_pole(N), NEAR + HANGING) for N in (25, 60, 100)},
-    "moving discs": (among_moving_discs(), FREE),
 }
 
 
