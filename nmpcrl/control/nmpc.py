@@ -16,7 +16,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.content import Described, key_of
 from nmpcrl.control.diagnosis import FARTHEST
-from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.sensitivity import Sensitivity
@@ -202,8 +202,8 @@ class Nmpc(Described):
         return (self._fixed if fix_action else self._free).machine
 
     @property
-    def ocp(self) -> Any:
-        """The problem with u_0 free, in symbols, an `Ocp`."""
+    def ocp(self) -> Ocp:
+        """The problem with u_0 free, in symbols."""
         return self._free.ocp
 
     def _variant(self, solution: Solution) -> Variant:
@@ -227,7 +227,7 @@ class Nmpc(Described):
         return Variant(ocp, self.solver)
 
 
-def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:
+def _checked(name: str, vector: Vector, size: int, largest: float) -> Vector:
     """A copy of a vector of this size with no number larger."""
     try:
         vector = np.array(vector, dtype=float)
