@@ -49,7 +49,7 @@ def one_episode(nmpc, theta, explore, cost=None, **world):
     return sum(step.cost for step in steps), optimiser.gradient, optimiser.curvature
 
 
-PUSHED = Exploration(np.array([[[9.0, 0.0], [0.0, 0.0]]]), np.ones((1, 2)))
+PUSHED = Exploration(np.array([[[9.0, 9.0], [0.0, 0.0]]]), np.ones((1, 2)))
 
 
 @pytest.mark.parametrize(
