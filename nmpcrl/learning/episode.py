@@ -135,20 +135,21 @@ def _row(step: Step) -> Vector:
 class Loop:
     """`loop.episode` with the learner, the plant and the controller of a trainer."""
 
-    def __init__(
-        self, trainer: Trainer, step: SemiGradient | GradientTD, machine: Any, fixed: Any,
-        *functions: Any,
-    ) -> None:  # fmt: skip
+    def __init__(self, trainer: Trainer) -> None:
         """Compile it, if that was not done before on this machine.
 
-        Args:
-            trainer: has everything else.
-            step: moves theta.
-            machine: the solver, as `Nmpc.machine` returns it.
-            fixed: the one with u_0 fixed where Q(s, a) is learned, else `machine`.
-            functions: the plant and its cost, compiled.
+        Raises:
+            CannotCompile: the loop does not know a part, or numba is missing.
         """
-        code, nmpc, learner = load("loop", TEXTS, NOTICE), trainer.nmpc, trainer.learner
+        learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
+        step, own = _known_step(learner, nmpc), type(nmpc) is Nmpc and trainer.controller is nmpc
+        machine = nmpc.machine(fix_action=False) if own and step and plant else None
+        fixed = nmpc.machine(fix_action=True) if machine and trainer.constrained else machine
+        if not (plant and step and machine and fixed):
+            raise CannotCompile("the loop does not know this learner, plant or solver")
+        advance = compiled(plant.transition, returned=False)
+        cost = compiled(nmpc.task.charge(nmpc.m), returned=True)
+        code = load("loop", TEXTS, NOTICE)
         self._code, self._machine, self._nmpc, self._valued = code, machine, nmpc, learner.bootstrap
         (slopes, *network), rule, beta = code.absent, code.loop.SEMI_GRADIENT, 0.0
         if isinstance(step, GradientTD):
@@ -162,7 +163,7 @@ class Loop:
         theta = trainer.weights.theta
         bounds = (np.full_like(theta, one) for one in learner.bounds or (-np.inf, np.inf))
         self._given = (
-            machine.code, slopes, *functions, *network,
+            machine.code, slopes, advance, cost, *network,
             tuple(machine.arguments), tuple(fixed.arguments),
             machine.others, machine.drawn, machine.tolerance,
             place, next_input, nmpc.farthest, nmpc.largest, rule, step.alpha, beta, *bounds,
@@ -172,22 +173,9 @@ class Loop:
 
     @classmethod
     def of(cls, trainer: Trainer) -> "Loop | None":
-        """The loop of a trainer; None where it does not know a part, or cannot compile one."""
-        learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
-        if trainer.controller is not nmpc or type(nmpc) is not Nmpc or type(learner) is not Learner:
-            return None
-        step = _known_step(learner, nmpc)
-        if not (step and plant and _known(learner.bootstrap, nmpc)) or learner.gamma != nmpc.gamma:
-            return None
-        machine = nmpc.machine(fix_action=False)
-        fixed = nmpc.machine(fix_action=True) if trainer.constrained else machine
-        if machine is None or fixed is None:
-            return None
-        assert nmpc.task  # or the environment would be no plant
-        cost = nmpc.task.charge(nmpc.m)
+        """The loop of a trainer; None where it does not know a part, or cannot be compiled."""
         try:
-            functions = compiled(plant.transition, returned=False), compiled(cost, returned=True)
-            return cls(trainer, step, machine, fixed, *functions)
+            return cls(trainer)
         except CannotCompile:
             return None
 
@@ -234,17 +222,18 @@ class Loop:
 
 
 def _known_step(learner: Learner, nmpc: Nmpc) -> SemiGradient | GradientTD | None:
-    """The step of a learner where the loop knows it; one that never learns has step size 0."""
-    step: Any = SemiGradient(0.0) if learner.bootstrap is nothing else learner.rule.step
-    if type(step) is GradientTD:
-        own = step.follow is auxiliary_step and (step.curved is None or step.curved is nmpc)
-        return step if own and step.gamma == nmpc.gamma else None
-    return step if type(step) is SemiGradient else None
-
-
-def _known(valued: Any, nmpc: Nmpc) -> bool:
-    """Whether the loop knows a bootstrap."""
+    """The step of a learner that the loop knows; one that never learns has step size 0."""
+    valued, step = learner.bootstrap, learner.rule.step
+    if type(learner) is not Learner or learner.gamma != nmpc.gamma:
+        return None
+    if valued is nothing:
+        return SemiGradient(0.0)
     if type(valued) is Imitation:
         known = type(valued.network) is QNetwork and type(valued.target) in (Target, type(None))
-        return known and valued.actions is None
-    return valued is nothing or (type(valued) is SecondSolve and valued.nmpc is nmpc)
+        known = known and valued.actions is None
+    else:
+        known = type(valued) is SecondSolve and valued.nmpc is nmpc
+    if type(step) is GradientTD:
+        own = step.follow is auxiliary_step and (step.curved is None or step.curved is nmpc)
+        return step if known and own and step.gamma == nmpc.gamma else None
+    return step if known and type(step) is SemiGradient else None
