@@ -11,11 +11,11 @@ LEARN = '''"""What is called to learn: `loop` on pointers, as in `entries`."""
 import numpy as np
 from numba import carray, float32, float64, int32, int64, njit, types, uint64
 
+from . import updates
 from .dense import fit, follow, predict, remember
 from .entries import COLD, address, places_in, unpacked
 from .find import find
 from .loop import COUNT, copy, episode, move, plain, start_in
-from .loop import td_error as error
 from .model import NTHETA, NU, NX, transition
 from .slopes import slopes
 from .task import charge
@@ -27,6 +27,7 @@ NETWORK = (  # the arrays of `dense`, with the rate among them; length of an inp
     types.CPointer(int64), int32, int32,
 )  # fmt: skip
 steps = plain(episode)
+td_error = njit(float64(float64, float64, float64, float64), error_model="numpy")(updates.td_error)
 
 
 @plain
@@ -71,12 +72,6 @@ def learn(
         carray(w, NTHETA), warm_, carray(noise, (1, NU)),
         carray(row, (1, COUNT + NX + NU + 3 * NTHETA)),
     )  # fmt: skip
-
-
-@njit(float64(float64, float64, float64, float64), error_model="numpy")
-def td_error(cost, gamma, q, q_next):
-    """Eq. (7)."""
-    return error(cost, gamma, q, q_next)
 
 
 @njit(

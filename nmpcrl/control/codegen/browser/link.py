@@ -18,7 +18,7 @@ FUNCTIONS = frozenset(  # what a module may import, from "env": JavaScript's Mat
 )
 
 MAGIC = b"\0asm\1\0\0\0"
-CUSTOM, TYPE, IMPORT, FUNCTION, MEMORY, GLOBAL, EXPORT, CODE, DATA = (*range(4), 5, 6, 7, 10, 11)
+CUSTOM, TYPE, IMPORT, FUNCTION, MEMORY, GLOBAL, EXPORT, CODE, DATA = 0, 1, 2, 3, 5, 6, 7, 10, 11
 SYMBOLS = 8  # a subsection of "linking"
 FUNCTION_SYMBOL, DATA_SYMBOL, GLOBAL_SYMBOL = 0, 1, 2
 UNDEFINED, NAMED = 0x10, 0x40  # of a symbol's flags

@@ -9,7 +9,6 @@
 @fault = global i32 0    ; why a call was ended: 1 no memory, 2 a size, 3 an error of the function
 
 declare void @llvm.trap()
-declare double @llvm.sqrt.f64(double)
 declare i32 @llvm.wasm.memory.size.i32(i32)
 
 define void @end_call(i32 %why) noinline noreturn {
@@ -112,10 +111,6 @@ done:
   ret void
 }
 
-define void @NRT_Free(ptr %info) alwaysinline {
-  ret void
-}
-
 ; Of contiguous arrays only: there are no others.
 define i32 @numba_attempt_nocopy_reshape(i64 %nd, ptr %dims, ptr %strides, i64 %new_nd, ptr %new_dims, ptr %new_strides, i64 %itemsize, i32 %fortran) alwaysinline {
 begin:
@@ -136,41 +131,6 @@ body:
   br label %axis
 done:
   ret i32 1
-}
-
-; x' y, for a @ b of two vectors.
-define i32 @numba_xxdot(i8 %kind, i8 %conjugate, i64 %count, ptr %x, ptr %y, ptr %result) alwaysinline {
-begin:
-  br label %next
-next:
-  %i = phi i64 [ 0, %begin ], [ %after, %term ]
-  %sum = phi double [ 0.0, %begin ], [ %more, %term ]
-  %left = icmp slt i64 %i, %count
-  br i1 %left, label %term, label %done
-term:
-  %index = trunc i64 %i to i32
-  %at_x = getelementptr double, ptr %x, i32 %index
-  %at_y = getelementptr double, ptr %y, i32 %index
-  %a = load double, ptr %at_x
-  %b = load double, ptr %at_y
-  %product = fmul double %a, %b
-  %more = fadd double %sum, %product
-  %after = add i64 %i, 1
-  br label %next
-done:
-  store double %sum, ptr %result
-  ret i32 0
-}
-
-; What numba calls where a product fails; ours does not.
-define void @Py_FatalError(ptr %text) noreturn {
-  call void @end_call(i32 3)
-  unreachable
-}
-
-define double @sqrt(double %x) alwaysinline {
-  %root = call double @llvm.sqrt.f64(double %x)
-  ret double %root
 }
 
 ; Of sizes, which are small or wrong: LLVM's own would need a product of 128 bits.
