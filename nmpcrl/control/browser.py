@@ -82,7 +82,7 @@ def _task(task: Task, inputs: int) -> str:
 def _inner(name: str, of: dict[str, ca.SX], result: ca.SX) -> str:
     """The text of a function that machine code calls."""
     function = ca.Function(name, [*of.values()], [result], [*of], ["result"])
-    return INNER + source(function)
+    return INNER + source(function, returned=True)
 
 
 def problem(

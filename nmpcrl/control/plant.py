@@ -100,7 +100,7 @@ class Plant(Described):
 
     @cached_property
     def _step(self) -> Callable[[Vector, Vector], Vector]:
-        return callable_of(self.transition, scalar=False)
+        return callable_of(self.transition)
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

@@ -177,7 +177,7 @@ class Task(Described):
         """The RL stage cost l(s, a), Eq. (20)."""
         inputs = len(action)
         if inputs not in self._charges:
-            self._charges[inputs] = callable_of(self.charge(inputs))
+            self._charges[inputs] = callable_of(self.charge(inputs), scalar=True)
         return self._charges[inputs](state, action, NO_DATA)
 
     @cached_property

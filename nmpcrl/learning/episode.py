@@ -147,7 +147,7 @@ class Loop:
         fixed = nmpc.machine(fix_action=True) if machine and trainer.constrained else machine
         if not (plant and step and machine and fixed):
             raise CannotCompile("the loop does not know this learner, plant or solver")
-        advance = compiled(plant.transition, returned=False)
+        advance = compiled(plant.transition)
         cost = compiled(nmpc.task.charge(nmpc.m), returned=True)
         code = load("loop", TEXTS, NOTICE)
         self._code, self._machine, self._nmpc, self._valued = code, machine, nmpc, learner.bootstrap

@@ -23,7 +23,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen import folder
-from nmpcrl.control.codegen.source import CannotCompile, returns, source
+from nmpcrl.control.codegen.source import CannotCompile, source
 
 COMPLETE = "complete"  # a file in the folder of a package: all of it is compiled
 LOADING = threading.Lock()  # a package that one thread is importing is no package yet
@@ -41,13 +41,12 @@ given, given_matrix = (Array(float64, axes, "C", readonly=True) for axes in (1, 
 """
 
 
-def compiled(function: ca.Function, *, returned: bool | None = None) -> Callable[..., Any]:
+def compiled(function: ca.Function, *, returned: bool = False) -> Callable[..., Any]:
     """`function` as machine code, called as `source` says, with contiguous arrays.
 
     Raises:
         CannotCompile: numba is missing, or an operation is not known.
     """
-    returned = returns(function) if returned is None else returned
     inputs = [function.size2_in(i) for i in range(function.n_in())]
     outputs = [] if returned else [function.size2_out(i) for i in range(function.n_out())]
     kinds = ["given" if columns == 1 else "given_matrix" for columns in inputs]
@@ -59,12 +58,9 @@ def compiled(function: ca.Function, *, returned: bool | None = None) -> Callable
     return made
 
 
-def callable_of(function: ca.Function, *, scalar: bool | None = None) -> Callable[..., Any]:
-    """`function` of vectors with one result, on NumPy: compiled if that can be done.
-
-    Returns a vector, or a float if the result is a scalar and not to be a vector of one.
-    """
-    shape, scalar = function.size1_out(0), returns(function) if scalar is None else scalar
+def callable_of(function: ca.Function, *, scalar: bool = False) -> Callable[..., Any]:
+    """`function` of vectors with one result, on NumPy: compiled if that can be done."""
+    shape = function.size1_out(0)
     try:
         code = compiled(function, returned=scalar)
     except CannotCompile:
@@ -162,7 +158,7 @@ def _holds(place: Path, texts: Mapping[str, str]) -> bool:
 
 
 def _in_numba(error: Exception) -> bool:
-    """Whether it was raised while numba compiled, and not by a module's own lines."""
+    """Whether an error was raised while numba compiled, and not by a module's own lines."""
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
     names = {frame.f_globals.get("__name__", "").partition(".")[0] for frame in frames}
     return bool(names & {"numba", "llvmlite"})

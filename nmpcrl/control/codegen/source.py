@@ -63,7 +63,7 @@ class CannotCompile(Exception):
 def source(
     function: ca.Function,
     *,
-    returned: bool | None = None,
+    returned: bool = False,
     matrices: Collection[str] = (),
     sparse: Collection[str] = (),
     added: Collection[str] = (),
@@ -71,12 +71,12 @@ def source(
 ) -> str:
     """The Python function of the same name, as text; needs `math` and NumPy as `np`.
 
-    Vectors come as arrays (k,), matrices as (k, l). A single scalar result is returned; otherwise
-    each result is written, zeros included, into an array that follows the arguments.
+    Vectors come as arrays (k,), matrices as (k, l). Each result is written, zeros included, into an
+    array that follows the arguments.
 
     Args:
         function: an SX function.
-        returned: whether the result is returned, if not as above.
+        returned: whether the only result, a scalar, is returned instead.
         matrices: arguments and results that are matrices even with a single column.
         sparse: results of which only the nonzeros are written.
         added: results whose nonzeros are added to the numbers in the array.
@@ -94,17 +94,11 @@ def source(
         for name, one in zip(function.name_out(), function.call(given), strict=True)
     ]
     out = ca.Function(function.name(), given, ca.cse(results), names, function.name_out())
-    returned = returns(function) if returned is None else returned
     layout = _Layout(matrices, added, shifted)
     lines = [_line(out, k, returned, layout) for k in range(out.n_instructions())] or ["pass"]
     written = [] if returned else [f"{name}_" for name in out.name_out()]
     arguments = ", ".join([*names, *written, *dict.fromkeys(shifted.values())])
     return "\n    ".join([f"def {out.name()}({arguments}):", *lines]) + "\n"
-
-
-def returns(function: ca.Function) -> bool:
-    """Whether the compiled function returns its result, a scalar, instead of writing it."""
-    return function.n_out() == 1 and function.size_out(0) == (1, 1)
 
 
 class _Layout(NamedTuple):

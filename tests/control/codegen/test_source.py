@@ -69,18 +69,18 @@ def test_matrices_vectors_scalars_and_zeros_are_laid_out_right():
         same(found, exact.full().reshape(found.shape))
 
 
-def test_the_entries_of_a_sparse_argument_are_found_and_one_scalar_is_returned():
+def test_the_entries_of_a_sparse_argument_are_found_and_a_scalar_is_returned():
     lower = ca.SX.sym("z", ca.Sparsity.lower(2))
     function = ca.Function("corner", [lower], [2 * lower[1, 1]], ["z"], ["r"])
-    assert compiled(function)(np.array([[1.0, 0.0], [3.0, 4.0]])) == 8.0
-    assert callable_of(ca.Function("product", [x, y], [x * y]))([3], [4]) == 12.0
+    assert compiled(function, returned=True)(np.array([[1.0, 0.0], [3.0, 4.0]])) == 8.0
+    assert callable_of(ca.Function("product", [x, y], [x * y]), scalar=True)([3], [4]) == 12.0
 
 
 @pytest.mark.parametrize(
     ("results", "options", "line"),
     [
-        ({"y": many[0] * many[1]}, {}, "    return w"),
-        ({"y": many[0] * many[1]}, {"returned": False}, "    y_[0] = w"),
+        ({"y": many[0] * many[1]}, {"returned": True}, "    return w"),
+        ({"y": many[0] * many[1]}, {}, "    y_[0] = w"),
         ({"y": many, "B": many[0]}, {"matrices": ("B",)}, "    B_[0, 0] = w"),
         ({"y": many}, {"shifted": {"y": "at"}}, "    y_[at + 1] = w"),
         ({"y": many}, {"added": ("y",)}, "    y_[1] += w"),
