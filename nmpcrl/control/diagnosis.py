@@ -78,11 +78,11 @@ class Diagnosis:
     def _too_fast(self, steps: int, value: Matrix, slope: Matrix, _: Matrix) -> str:
         """How fast the model is, or how far it leads."""
         growth = np.abs(np.linalg.eigvals(slope[:, : self._problem.states])).max()
+        largest = np.abs(value).max()
         if growth > FASTEST:
             does = f"makes {growth:.1g} times as much of a small deviation in one step"
             return f"model {does}, {{}}: {SUBSTEPS}"
-        if np.abs(value).max() > FARTHEST:
-            largest = np.abs(value).max()
+        if largest > FARTHEST:
             return f"model leads to {largest:.1g} in {steps} steps at rest: {UNSTABLE}"
         return ""
 
