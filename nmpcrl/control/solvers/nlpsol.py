@@ -173,7 +173,7 @@ class Program:
         if warm_start is not None:
             same = np.array_equal(warm_start.state, state)
             start = Start.SAME if same else Start.SHIFTED
-            z, lam, nu = carried(warm_start, self._ocp, shift=not same)
+            z, lam, nu = reorder(warm_start, self._ocp, shift=not same)
             z[self._ocp.states[0]] = state
             nu[np.isinf(self._ocp.lower) & np.isinf(self._ocp.upper)] = (
                 0  # as fatrop was given them
@@ -257,7 +257,7 @@ class Program:
         nu[self._ocp.slacks[0][which]] = np.where(inside, 0.0, -weights)
 
 
-def carried(warm_start: Solution, ocp: Ocp, *, shift: bool = False) -> PrimalDual:
+def reorder(warm_start: Solution, ocp: Ocp, *, shift: bool = False) -> PrimalDual:
     """z, lam and nu of a solution in the order of an OCP; a `shift` is one stage, the end repeated.
 
     Shifting divides every stage's discount by gamma, and with it the multipliers.

@@ -20,7 +20,7 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.control.solvers.nlpsol import Fatrop, Program, carried
+from nmpcrl.control.solvers.nlpsol import Fatrop, Program, reorder
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Prepared, Solver
 from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
@@ -225,4 +225,4 @@ class Compiled:
         """The warm start's z, lam and nu in the order of this OCP."""
         if warm_start.ocp is self._ocp:
             return warm_start.point
-        return np.concatenate(carried(warm_start, self._ocp))
+        return np.concatenate(reorder(warm_start, self._ocp))

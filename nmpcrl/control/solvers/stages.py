@@ -69,7 +69,7 @@ def _written(f: ca.Function) -> str:
 
 
 def _of_all_rows(f: ca.Function) -> str:
-    """The text of a function of a stage's rows, from that of the rows of a line."""
+    """The text of a function of all rows of a stage, which calls one of a line's rows."""
     given = [*f.name_in(), *(f"{name}_" for name in f.name_out())]
     of_line = ["d" if name == "line" else name for name in given]
     begins = ["OWN + WIDTH * line"] * ("line" in given) + ["at + FIXED + PER * line"]

@@ -52,7 +52,7 @@ def trace(
 ) -> pd.DataFrame:
     """Every iterate of the first start of V_theta(s), from the start to the answer, a row each.
 
-    Without `curvature` the Hessian lacks that of dynamics and rows (Gauss-Newton). `ocp` is
+    Without `curvature` the Hessian leaves out dynamics and rows (Gauss-Newton). `ocp` is
     `Nmpc.ocp`, `data` is from `Problem.stage_data`, the other arguments are those of `Nmpc.solve`.
 
     Columns: error (of the KKT conditions, as the solver judges it), mu (barrier parameter), value
