@@ -11,7 +11,6 @@ from small_problems import drawn, limited, pendulum, tank
 
 from nmpcrl.control import Ipopt, Nmpc, Problem, Riccati
 from nmpcrl.study import paper
-from nmpcrl.study.problems import gros_zanon
 
 
 class Case(NamedTuple):
@@ -39,8 +38,7 @@ def of(problem: Problem) -> Callable[[Any], Nmpc]:
 CASES = {
     "the robot": Case(
         lambda solver: paper.nmpc(solver=solver),
-        [3, 3, 0], [6, 6, 3], theta=0.3, count=12, compared=10, tolerance=1e-4,
-        compiled=True,
+        [3, 3, 0], [6, 6, 3], theta=0.3, count=12, compared=10, tolerance=1e-4, compiled=True,
     ),
     "a soft box": Case(
         lambda solver: paper.nmpc(solver=solver, box="soft", horizon=3),
@@ -52,13 +50,6 @@ CASES = {
     **{f"problem {k}": Case(of(drawn(k)), 0.0, 1.0, compared=2, count=3) for k in range(15)},
     "megapascals": Case(of(tank(1e6)), [5e5, 1e6], [5e5, 5e5], count=6, compared=4),
 }  # fmt: skip
-SLOW = {
-    "Gros and Zanon": Case(
-        of(gros_zanon.problem()), [0.5, 0.0], [0.5, 1.0], theta=0.05, count=60, compared=80,
-        tolerance=1e-3, compiled=True,
-    ),
-}  # fmt: skip
-ALL = [*CASES, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
 
 
 def asked(case: Case, nmpc: Nmpc) -> Iterator[tuple[Any, ...]]:
@@ -75,9 +66,9 @@ def asked(case: Case, nmpc: Nmpc) -> Iterator[tuple[Any, ...]]:
             yield state, theta, {"action": action, "data": data}
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", CASES)
 def test_values_and_all_derivatives_are_those_of_ipopt_and_of_differences(name, request):
-    case = {**CASES, **SLOW}[name]
+    case = CASES[name]
     if not case.compiled:
         request.getfixturevalue("interpreted")
     riccati, ipopt, compared = case.make(Riccati(1e-11)), case.make(Ipopt(1e-10)), 0

@@ -1,4 +1,4 @@
-"""All solvers: warm starts help, boundaries have a side, every solve ends; and CasADi's alone."""
+"""All solvers: warm starts help, every solve ends, maxima are left; and CasADi's alone."""
 
 import pickle
 import subprocess
@@ -14,7 +14,6 @@ from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
-OMEGA = 100.0
 CASADI_SOLVERS = ("fatrop", "ipopt")
 of_casadi = pytest.mark.parametrize("solver", CASADI_SOLVERS)  # to these the box is hard
 
