@@ -50,11 +50,11 @@ def plain() -> dict[str, dict[str, np.ndarray]]:
 @each
 @pytest.mark.parametrize(
     "units",
-    [(1e5, 1, 1), (1e-6, 1, 1), (1e12, 1, 1), (1, 1e-3, 1), (1, 1e-7, 1), (1, 1e6, 1),
+    [(1e5, 1, 1), (1e-6, 1, 1), (1e12, 1, 1), (1, 1e-3, 1), (1, 1e-8, 1), (1, 1e6, 1),
      (1, 1, 1e-9), (1, 1, 1e-6), (1, 1, 1e-3), (1, 1, 1e6)],
 )  # fmt: skip
 def test_the_plan_in_other_units_is_the_same_plan(solver, units, plain):
-    """Units of states and inputs, of a row, whose price at 1e-7 takes a digit, and of the costs."""
+    """Units of states and inputs, of a row, whose price at 1e-8 takes digits, and of the costs."""
     if solver.name not in plain:
         plain[solver.name] = numbers(Nmpc(tank(1.0), solver=solver), 1.0, 1.0, 1.0)
     other = numbers(Nmpc(tank(*units), solver=solver), *units)
