@@ -281,10 +281,11 @@ class Problem(Described):
         return float(found) if 0 < found < np.inf else 1.0
 
     def row_sizes(self, rows: ca.SX) -> ca.SX:
-        """The slope of each row along `sizes`; 1 where it lies between `SMALL` and `LARGE`."""
-        e = self.expressions
-        slopes = ca.jacobian(rows, ca.vertcat(e.x, e.u))
-        found = ca.densify(ca.mtimes(ca.fabs(slopes), ca.DM(np.concatenate(self.sizes))))
+        """Slope and curvature of each row along `sizes`; 1 if between `SMALL` and `LARGE`."""
+        z, sizes = ca.vertcat(self.expressions.x, self.expressions.u), np.concatenate(self.sizes)
+        slopes = ca.jacobian(rows, z)
+        bends = (ca.jacobian(slopes[:, k], z[k]) * sizes[k] / 2 for k in range(sizes.size))
+        found = ca.densify((ca.fabs(slopes) + ca.fabs(ca.horzcat(*bends))) @ ca.DM(sizes))
         usual = ca.logic_and(found > SMALL, found < LARGE)
         unknown = ca.logic_not(found < 1 / LEAST)  # or nan
         return ca.if_else(ca.logic_or(usual, unknown), 1, found + LEAST)

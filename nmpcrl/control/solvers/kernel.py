@@ -52,8 +52,7 @@ PUSH = (1e-2, 1e-3, 1e-3, 1e-9, 1e-2)  # of its bounds' distance, by which an in
 PLANNED, SETTLED = 1, 2  # kinds of rows, else absent
 STRICT = 1e4  # W of hard rows, scaled: an exact penalty, so that no state is infeasible
 STRICT_TO_SOFT = 100.0  # so many times the largest other W it is at least
-DEAREST = 1e3  # W in sizes of the costs, beyond which digits are lost
-DEARER = 1e4  # times the size of the costs, by which a problem is divided at most for that
+DEAREST = 1e3  # W times its row's size in sizes of the costs, beyond which digits are lost
 ABSURD = 1e9  # no plan goes through such a state
 GROWS = 3.0  # times the first state's distance from a plan: inputs leave it by more
 NOTICED = 0.1  # and by more than this part of its largest state
@@ -798,17 +797,17 @@ def task_of(theta, data, lower, upper, sides, kind, discount, weights, first):
 
 
 @inlined
-def scale(task, point, weights):
+def scale(task, point, weights, sizes):
     """Divide the problem by the size of its costs along the plan of a start, which is returned."""
     last, rate = len(point.u), task.rate
     factor = rate[last] * model.terminal_size(point.x[last], task.theta, task.data[last])
     for i in range(last):
         size = model.stage_size(point.x[i], point.u[i], task.theta, task.data[i])
         factor = max(factor, rate[i] * size)
-    most = DEARER * factor
+    model.size_rows(point.x[0], point.u[0], task.theta, task.data[0], sizes, 0, task.lines)
     for j in range(len(weights)):
         if weights[j] < np.inf:
-            factor = max(factor, min(weights[j] / DEAREST, most))
+            factor = max(factor, weights[j] * sizes[j] / DEAREST)
     if not 0.0 < factor < np.inf:
         factor = 1.0
     strict = STRICT
@@ -1034,7 +1033,7 @@ def solve(
         regulate(task, trial, stages, step, point)
     else:
         roll(task, point)
-    factor = scale(task, point, weights)
+    factor = scale(task, point, weights, stages.firm)
     gain = task.rate[0] / task.rate[ahead] / factor
     begin_bounds(task, point, duals, old, mu, gain)
     if not cold and strays(point, trial, ahead):

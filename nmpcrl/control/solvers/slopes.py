@@ -155,7 +155,7 @@ def slopes(
     recall(task, SAME, solved, plan, old)
     begin_inputs(task, point, state, action, SAME, plan.u)
     roll(task, point)
-    factor = scale(task, point, weights)
+    factor = scale(task, point, weights, stages.firm)
     begin_bounds(task, point, duals, old, mu, 1.0 / factor)
     for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
         for a in range(NX):
