@@ -87,14 +87,6 @@ def test_cold_solves_are_no_worse_than_those_of_fatrop_and_ipopt(name):
     assert taken_over == 0
 
 
-@pytest.fixture
-def plant():
-    """The pendulum, more exact than it is planned with, and pushed."""
-    x, u, rng = ca.SX.sym("x", 2), ca.SX.sym("u"), np.random.default_rng(1)
-    step = ca.Function("step", [x, u], [rk4(lambda x, u: swing(x, u, 9.81), x, u, PERIOD, 4)])
-    return lambda x, u: step(x, u).full().ravel() + 0.1 * rng.normal(size=2)
-
-
 @pytest.mark.parametrize("horizon", [20, 60, 100])
 @pytest.mark.parametrize("state", [(0.1, 0.0), (-0.4, 0.5)])
 def test_a_pendulum_that_stands_is_planned_to_stand(horizon, state):
@@ -110,13 +102,16 @@ def test_a_pendulum_that_stands_is_planned_to_stand(horizon, state):
 
 
 @pytest.mark.parametrize("horizon", [20, 60])
-def test_a_pendulum_that_is_pushed_is_held_by_warm_solves_as_by_cold_ones(plant, horizon):
+def test_a_pendulum_that_is_pushed_is_held_by_warm_solves_as_by_cold_ones(horizon):
+    """It is stepped more exactly than it is planned with."""
+    x, u, rng = ca.SX.sym("x", 2), ca.SX.sym("u"), np.random.default_rng(1)
+    step = ca.Function("step", [x, u], [rk4(lambda x, u: swing(x, u, 9.81), x, u, PERIOD, 4)])
     nmpc, warm, state = Nmpc(pendulum(horizon)), None, np.array([0.3, 0.0])
     for _ in range(40):
         warm = nmpc.solve(state, nmpc.problem.theta, warm)
         cold = nmpc.solve(state, nmpc.problem.theta)
         assert warm.value <= cold.value * (1 + 1e-6)
-        state = plant(state, warm.action)
+        state = step(state, warm.action).full().ravel() + 0.1 * rng.normal(size=2)
     assert abs(state[0]) < 0.5
 
 

@@ -6,8 +6,6 @@
 import numpy as np
 import pytest
 from differences import agrees
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from small_problems import open_field, point_mass
 
 from nmpcrl.control import Nmpc, Obstacle, Riccati, Task, differential_drive
@@ -29,28 +27,21 @@ def test_the_solution_may_be_another_solvers(controllers, draw, giver):
         np.testing.assert_allclose(product, dense, atol=1e-4 * np.abs(dense).max())
 
 
-vectors = st.lists(st.floats(-1, 1), min_size=9, max_size=9).map(lambda v: np.array(v) * THETA)
-states = st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-4, 4)).map(np.array)
-thetas = st.lists(st.floats(0.3, 3), min_size=9, max_size=9).map(lambda v: np.array(v) * THETA)
-
-
-@settings(derandomize=True, deadline=None, max_examples=100)
-@given(state=states, theta=thetas, u=vectors, v=vectors, times=st.floats(-100, 100))
-def test_products_are_linear_and_the_hessian_behind_them_is_symmetric(
-    controllers, state, theta, u, v, times
-):
+def test_products_are_linear_and_the_hessian_behind_them_is_symmetric(controllers, draw):
     """u'Hv = v'Hu and H(u + t v) = Hu + t Hv, whatever is active and however weakly."""
-    riccati = controllers["riccati"]
-    solution = riccati.solve(state, theta)
-    before, vector = solution.point.copy(), u.copy()
-    one, other, both = (riccati.value_hessian_times(solution, w) for w in (u, v, u + times * v))
-    size = np.abs(u) @ np.abs(other) + np.abs(v) @ np.abs(one)
-    assert v @ one == pytest.approx(u @ other, abs=1e-9 + 1e-6 * size)
-    size = np.abs(one).max() + abs(times) * np.abs(other).max()
-    np.testing.assert_allclose(both, one + times * other, atol=1e-10 + 1e-7 * size)
-    np.testing.assert_array_equal(riccati.value_hessian_times(solution, 0 * u), 0)
-    np.testing.assert_array_equal(solution.point, before)
-    np.testing.assert_array_equal(u, vector)
+    riccati, rng = controllers["riccati"], np.random.default_rng(54)
+    for state, theta in draw(100, seed=54):
+        solution = riccati.solve(state, theta)
+        (u, v), times = rng.uniform(-1, 1, (2, 9)) * THETA, rng.uniform(-100, 100)
+        before, vector = solution.point.copy(), u.copy()
+        one, other, both = (riccati.value_hessian_times(solution, w) for w in (u, v, u + times * v))
+        size = np.abs(u) @ np.abs(other) + np.abs(v) @ np.abs(one)
+        assert v @ one == pytest.approx(u @ other, abs=1e-9 + 1e-6 * size)
+        size = np.abs(one).max() + abs(times) * np.abs(other).max()
+        np.testing.assert_allclose(both, one + times * other, atol=1e-10 + 1e-7 * size)
+        np.testing.assert_array_equal(riccati.value_hessian_times(solution, 0 * u), 0)
+        np.testing.assert_array_equal(solution.point, before)
+        np.testing.assert_array_equal(u, vector)
 
 
 @pytest.mark.parametrize("radius", [0.5, 1.25])
