@@ -228,7 +228,7 @@ def test_a_module_is_made_once_with_the_same_bytes_and_again_after_damage(tmp_pa
     monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
     first = from_texts(parts)
     with monkeypatch.context() as patch:
-        patch.setattr(browser, "_made", raising(AssertionError("it is made")))
+        patch.setattr(browser, "_build", raising(AssertionError("it is made")))
         assert from_texts(parts) == first
     (kept,) = tmp_path.glob("*.wasm.gz")
     kept.write_bytes(kept.read_bytes()[:-1] + b"?")

@@ -8,7 +8,7 @@ The very functions that train every run are compiled, with what numba brings and
 3. `link`: the object becomes a module with a memory of its own, which asks its host for some of
    `FUNCTIONS` and nothing else.
 
-A module is made once and kept with the machine code.
+A module is built once and kept with the machine code.
 """
 
 import gzip
@@ -44,22 +44,22 @@ def from_texts(texts: Mapping[str, str]) -> bytes:
     """
     own = [path.read_text("utf-8") for path in sorted(Path(__file__).parent.glob("*.*"))]
     name = jit.key("browser", texts, own, version("llvmlite"))
-    return folder.use(f"{name}.wasm.gz", lambda place: _kept(place, texts))
+    return folder.use(f"{name}.wasm.gz", lambda place: _read_or_build(place, texts))
 
 
-def _kept(place: Path, texts: Mapping[str, str]) -> bytes:
-    """The module of a file, made if the file is missing or damaged."""
+def _read_or_build(place: Path, texts: Mapping[str, str]) -> bytes:
+    """The module in a file, built if the file is missing or damaged."""
     try:
         return gzip.decompress(place.read_bytes())
     except (FileNotFoundError, gzip.BadGzipFile, EOFError, zlib.error):
-        module = _made(texts)
+        module = _build(texts)
     with suppress(OSError):  # the next process makes it once more
         place.write_bytes(gzip.compress(module))
     return module
 
 
-def _made(texts: Mapping[str, str]) -> bytes:
-    """The module, made by a process of its own: numba's import reads `UNASSUMING`."""
+def _build(texts: Mapping[str, str]) -> bytes:
+    """The module, built by a process of its own: numba's import reads `UNASSUMING`."""
     done = subprocess.run(
         [sys.executable, "-m", __name__],
         input=json.dumps(dict(texts)).encode(),
@@ -68,8 +68,8 @@ def _made(texts: Mapping[str, str]) -> bytes:
         check=False,
     )
     if done.returncode:
-        said = done.stderr.decode().strip() or "it says nothing"
+        reason = done.stderr.decode().strip() or "it says nothing"
         for kind in ("numba.core.errors.", f"{__name__}.link."):
-            said = said.rpartition(kind)[2]
-        raise RuntimeError(f"numba cannot compile these functions for a browser: {said[-1000:]}")
+            reason = reason.rpartition(kind)[2]
+        raise RuntimeError(f"numba cannot compile these functions for a browser: {reason[-1000:]}")
     return done.stdout

@@ -4,9 +4,9 @@ import json
 import sys
 
 from nmpcrl.control.codegen.browser.emit import RUNTIME, emit
-from nmpcrl.control.codegen.browser.ir import described
+from nmpcrl.control.codegen.browser.ir import describe
 from nmpcrl.control.codegen.browser.link import link
 
-functions, ir = described(json.load(sys.stdin))
+functions, ir = describe(json.load(sys.stdin))
 exports = [*RUNTIME, *(function.name for function in functions)]
 sys.stdout.buffer.write(link(emit(functions, ir), exports))

@@ -28,7 +28,7 @@ class Function(NamedTuple):
     result: str  # its type
 
 
-def described(texts: Mapping[str, str]) -> tuple[list[Function], str]:
+def describe(texts: Mapping[str, str]) -> tuple[list[Function], str]:
     """Every function in the `EXPORTS` of the modules, and the LLVM IR of all that they call."""
     cpu_target._toplevel_target_context = DescribingContext(cpu_target.typing_context, "cpu")
     exporting = [module for module, text in texts.items() if "\nEXPORTS = " in text]

@@ -51,14 +51,14 @@ def link(data: bytes, exports: Iterable[str]) -> bytes:
 
 
 def _sections(data: BytesIO) -> dict[int, bytes]:
-    """The content of each section; of those with a name, only "linking"."""
-    found = {}
+    """The content of each section; of custom sections, only "linking"."""
+    contents = {}
     data.seek(len(MAGIC))
     while kind := data.read(1):
         content = data.read(_number(data))
         if kind[0] != CUSTOM or content.startswith(_name("linking")):
-            found[kind[0]] = content
-    return found
+            contents[kind[0]] = content
+    return contents
 
 
 def _functions(linking: BytesIO) -> Iterator[tuple[str, int]]:
@@ -71,16 +71,16 @@ def _functions(linking: BytesIO) -> Iterator[tuple[str, int]]:
     for _ in range(_number(linking)):
         kind, flags = linking.read(1)[0], _number(linking)
         if kind == DATA_SYMBOL:
-            called = _text(linking)
+            name = _text(linking)
             if flags & UNDEFINED:
-                raise CannotLink(f"{called} is nowhere")
+                raise CannotLink(f"the data {name} are not defined")
             for _ in range(3):  # segment, offset, size
                 _number(linking)
         elif kind in (FUNCTION_SYMBOL, GLOBAL_SYMBOL):
             index = _number(linking)
-            called = _text(linking) if not flags & UNDEFINED or flags & NAMED else ""
+            name = _text(linking) if not flags & UNDEFINED or flags & NAMED else ""
             if kind == FUNCTION_SYMBOL:
-                yield called, index
+                yield name, index
         else:
             raise CannotLink(f"a symbol is of a kind, {kind}, that is not known here")
 
@@ -88,16 +88,16 @@ def _functions(linking: BytesIO) -> Iterator[tuple[str, int]]:
 def _imports(section: BytesIO) -> Iterator[bytes]:
     """The imported functions; memory and stack pointer are the module's own."""
     for _ in range(_number(section)):
-        module, called, kind = _text(section), _text(section), section.read(1)[0]
-        if called == "__linear_memory":
+        module, name, kind = _text(section), _text(section), section.read(1)[0]
+        if name == "__linear_memory":
             section.read(1)  # without a maximum
             _number(section)
-        elif called == "__stack_pointer":
+        elif name == "__stack_pointer":
             section.read(2)  # its type
-        elif kind == 0 and called in FUNCTIONS:
-            yield _name(module) + _name(called) + b"\0" + _bytes(_number(section))
+        elif kind == 0 and name in FUNCTIONS:
+            yield _name(module) + _name(name) + b"\0" + _bytes(_number(section))
         else:
-            raise CannotLink(f"the functions call {called}, which a browser does not have")
+            raise CannotLink(f"the functions call {name}, which a browser does not have")
 
 
 def _constants(section: BytesIO) -> Iterator[bytes]:
