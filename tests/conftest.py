@@ -211,12 +211,11 @@ def jupyter_lab() -> str:
 
 
 @pytest.fixture(scope="session")
-def robot_module(shared) -> bytes:
+def robot_module() -> bytes:
     """The robot's controller and the update rules as WebAssembly; a minute to make, once."""
     from nmpcrl.learning import browser
 
-    with FileLock(shared / "robot_module.lock"):  # the others find it where modules are kept
-        return browser.module(differential_drive(), paper.task("A"))
+    return browser.module(differential_drive(), paper.task("A"))
 
 
 LOOPS = ("without noise", "with noise")

@@ -42,8 +42,8 @@ def use(name: str, work: Callable[[Path], Result]) -> Result:
     place = tempfile.mkdtemp(prefix="nmpcrl-")
     atexit.register(shutil.rmtree, place, ignore_errors=True)
     os.environ[CHOSEN] = place
-    said = f"{why}; machine code is kept in a temporary folder until this process ends"
-    print(said, file=sys.stderr)
+    message = f"{why}; machine code is kept in a temporary folder until this process ends"
+    print(message, file=sys.stderr)
     return _locked(name, work)
 
 
@@ -73,11 +73,12 @@ def private(place: Path) -> Path:
 
 def write(place: Path, texts: Mapping[str, str]) -> None:
     """Write the modules of a package into its folder, made if it is missing."""
+    private(place)
     for module, text in texts.items():
-        (private(place) / f"{module}.py").write_bytes(text.encode())
+        (place / f"{module}.py").write_bytes(text.encode())
 
 
-def imported(place: Path) -> ModuleType:
+def import_package(place: Path) -> ModuleType:
     """The package in a folder; if its import fails, none of its modules stays."""
     sys.path.insert(0, str(place.parent))
     importlib.invalidate_caches()

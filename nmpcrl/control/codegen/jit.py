@@ -127,7 +127,7 @@ def _load(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
         try:
             if not _holds(place, texts):
                 raise ImportError("its text is another")
-            return folder.imported(place)
+            return folder.import_package(place)
         except (OSError, MemoryError):
             raise
         except Exception as error:  # whatever a damaged file makes numba raise
@@ -138,7 +138,7 @@ def _load(place: Path, texts: Mapping[str, str], notice: str) -> ModuleType:
         print(notice, end=" ", file=sys.stderr, flush=True)
     try:
         folder.write(place, texts)
-        module = folder.imported(place)
+        module = folder.import_package(place)
     except Exception as error:
         shutil.rmtree(place, ignore_errors=True)
         if isinstance(error, OSError | MemoryError) or not _in_numba(error):

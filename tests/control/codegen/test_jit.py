@@ -157,7 +157,7 @@ def test_a_process_with_too_little_memory_removes_nothing(cache, monkeypatch):
     texts = {"__init__": "answer = 42\n"}
     del sys.modules[jit.load("complete", texts).__name__]
     with monkeypatch.context() as patch:
-        patch.setattr(folder, "imported", raising(MemoryError()))
+        patch.setattr(folder, "import_package", raising(MemoryError()))
         with pytest.raises(MemoryError):
             jit.load("complete", texts)
     assert [*cache.rglob(jit.COMPLETE)]
@@ -211,7 +211,7 @@ UNFIT: dict[str, Callable[[Path, pytest.MonkeyPatch], str]] = {
     "open to a group": lambda cache, _: open_to(cache, 0o770),
     "open to all": lambda cache, _: open_to(cache, 0o707),
     "full": lambda *given: full(*given, "write"),
-    "filled by numba": lambda *given: full(*given, "imported"),
+    "filled by numba": lambda *given: full(*given, "import_package"),
 }
 
 

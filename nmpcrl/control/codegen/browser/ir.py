@@ -37,7 +37,7 @@ def describe(texts: Mapping[str, str]) -> tuple[list[Function], str]:
     with tempfile.TemporaryDirectory() as parent:
         place = Path(parent) / PACKAGE
         folder.write(place, uncached | {"__init__": init})
-        package = folder.imported(place)
+        package = folder.import_package(place)
     functions, whole = [], llvm.parse_assembly("")
     for exported in (one for module in exporting for one in getattr(package, module).EXPORTS):
         (result,) = exported.overloads.values()
