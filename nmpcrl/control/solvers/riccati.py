@@ -191,7 +191,7 @@ class Compiled:
         """du_0 / dtheta, shape (m, d), a sweep an input; None likewise."""
         still, weights = np.zeros(solution.theta.size), np.eye(self._problem.inputs)
         found = [self._slopes(solution, still, one) for one in weights]
-        return None if found[0] is None else np.array(found)
+        return None if any(one is None for one in found) else np.array(found)
 
     def feedback(self, solution: Solution) -> Matrix | None:
         """du_0 / ds, shape (m, n), the gain of stage 0; None likewise."""
