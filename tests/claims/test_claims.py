@@ -439,12 +439,6 @@ def test_the_audit_measures_kinks_memory_and_the_dropped_term(on_boundary):
     assert found.memory == pytest.approx(1)
 
 
-@pytest.mark.parametrize("claim", BY_RUNS.values(), ids=BY_RUNS)
-def test_other_borders_lie_on_both_sides_of_the_claim_s_own(claim):
-    assert claim.borders[0] < claim.threshold < claim.borders[-1]
-    assert (np.diff(claim.borders) > 0).all()
-
-
 def test_all_claims_are_judged_in_order():
     runs = study()
     assert list(CLAIMS) == [f"C{i}" for i in range(1, 10)]

@@ -16,7 +16,6 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import population
 from nmpcrl.studies.difficulty import MEASURES, PILOT
 from nmpcrl.studies.population import EXPECTED, JUDGED, PARTS, PICTURE, POPULATION, seed_of
-from nmpcrl.study.design import MAIN_TABLE, VARIANTS
 from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 
@@ -133,18 +132,6 @@ def test_a_weaker_question_counts_in_drawn_layouts_as_it_does_in_a_to_f(overlap,
         assert found.loc[claim, "holding"] == 0
         assert found.loc[claim, "outcome"] == outcome
         assert verdict.settled(Observations(runs)).outcome == outcome
-
-
-def test_the_picture_is_sought_everywhere(drawn):
-    tried = drawn.tried
-    there = tried[tried.layout.isin([*"ABCDEF"])]
-    assert {*there.setting} == {MAIN_TABLE, *VARIANTS} - {"controls"}
-    assert (there.setting == MAIN_TABLE).sum() == 12
-    assert not tried.duplicated(["setting", "layout", "decay"]).any()
-    by_cell = tried.set_index(["setting", "layout", "decay"])
-    same, other = by_cell.loc["greedy", "D", "step"], by_cell.loc[MAIN_TABLE, "D", "step"]
-    assert same.C5 == other.C5  # of learners that the variant does not change
-    assert same.C1 != other.C1
 
 
 def test_the_nearest_comes_first_and_only_a_whole_one_confirms(drawn):
