@@ -197,6 +197,18 @@ class Nmpc(Described):
         """The nearest action within the bounds, shape (m,)."""
         return np.minimum(np.maximum(action, self.lower), self.upper)
 
+    def compile(self) -> None:
+        """Compile solver, derivatives, plant and cost now, and not where they are first used.
+
+        It takes half a minute, once on a machine, and says on standard error what it does; CasADi's
+        solvers take no time. `learning` compiles a loop of its own where a run begins.
+        """
+        if isinstance(self._free.solver, Compiled):
+            _ = self._free.solver.slopes
+        if self.plant is not None and self.task is not None:
+            still = self.clip(np.zeros(self.m))
+            self.task.stage_cost(self.plant.step(self.task.start, still), still)
+
     def machine(self, *, fix_action: bool) -> Compiled | None:
         """The compiled solver for V(s) or Q(s, a); None as in `Variant.machine`."""
         return (self._fixed if fix_action else self._free).machine

@@ -288,7 +288,8 @@ class Problem(Described):
         found = ca.densify((ca.fabs(slopes) + ca.fabs(ca.horzcat(*bends))) @ ca.DM(sizes))
         usual = ca.logic_and(found > SMALL, found < LARGE)
         unknown = ca.logic_not(found < 1 / LEAST)  # or nan
-        return ca.if_else(ca.logic_or(usual, unknown), 1, found + LEAST)
+        known: ca.SX = ca.if_else(ca.logic_or(usual, unknown), 1, found + LEAST)
+        return known
 
     def all_row_sizes(self, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
         """`row_sizes` of all rows, in the order of `rows`."""
