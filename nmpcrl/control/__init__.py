@@ -1,5 +1,6 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
+from nmpcrl.control.batch import Batch
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
 from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
@@ -8,6 +9,7 @@ from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
 
 __all__ = [
+    "Batch",
     "DerivativeError",
     "Fatrop",
     "Hard",

@@ -8,11 +8,13 @@ import math
 import time
 from collections.abc import Mapping
 from functools import cached_property
+from multiprocessing import cpu_count
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.batch import Batch, solve_many, stage_data, table
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.content import Described, key_of
 from nmpcrl.control.diagnosis import FARTHEST
@@ -25,6 +27,7 @@ from nmpcrl.control.solvers import Fatrop, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
+from nmpcrl.control.vectors import positive_integer
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
@@ -146,6 +149,47 @@ class Nmpc(Described):
             if said == error.status:
                 raise
             raise type(error)(said, state, theta) from error
+
+    def solve_many(
+        self,
+        states: Matrix,
+        thetas: Matrix,
+        warm_starts: Batch | None = None,
+        actions: Matrix | None = None,
+        data: Mapping[str, Any] | None = None,
+        threads: int | None = None,
+    ) -> Batch:
+        """Solve from each of B states: what `solve` finds in each, to the last bit, as arrays.
+
+        Nothing is raised where a solve fails: `Batch.status` says so. Threads solve beside each
+        other by riccati; CasADi's solvers, which take over where it fails, solve one at a time.
+
+        Args:
+            states: shape (B, n).
+            thetas: shape (B, d), or (d,) for all.
+            warm_starts: an earlier batch of B, of which those that were solved are warm starts.
+            actions: first inputs, shape (B, m), or (m,) for all; free if absent.
+            data: as in `solve`, for all; an array with an axis of B and one of N + 1 in front
+                differs between the problems.
+            threads: how many, at least 1; as many as the machine has cores if absent.
+
+        Raises:
+            ValueError: a shape is another.
+        """
+        states = table("states", states, self.n)
+        thetas = table("thetas", thetas, self.problem.theta.size, len(states))
+        usable = (np.abs(states) <= self.farthest).all(1) & (np.abs(thetas) <= self.largest).all(1)
+        if actions is not None:
+            actions = table("actions", actions, self.m, len(states))
+            usable &= ((actions >= self.lower) & (actions <= self.upper)).all(1)
+            usable &= (np.abs(actions) <= self._strongest).all(1)
+        known = stage_data(self.problem, data or {}, len(states))
+        for k in np.flatnonzero(usable & (thetas < 0).any(1)).tolist():
+            if (thetas[k] < self._bending.least).any():
+                self._bending.judge(states[k], thetas[k], known[min(k, len(known) - 1)])
+        variant = self._free if actions is None else self._fixed
+        threads = cpu_count() if threads is None else positive_integer("threads", threads)
+        return solve_many(variant, usable, states, thetas, warm_starts, actions, known, threads)
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""

@@ -30,16 +30,16 @@ class Units:
         return replace(
             solution,
             state=solution.state / self.states,
-            point=solution.point / self._sizes(solution.ocp),
+            point=solution.point / self.sizes(solution.ocp),
             ocp=self.ocp if solution.ocp is self._outer else solution.ocp,
         )
 
     def outside(self, found: Solution, state: Vector) -> Solution:
         """A solution of `ocp` in the problem's units."""
-        point = found.point * self._sizes(self._outer)
+        point = found.point * self.sizes(self._outer)
         return replace(found, state=state, point=point, ocp=self._outer)
 
-    def _sizes(self, ocp: Ocp) -> Vector:
+    def sizes(self, ocp: Ocp) -> Vector:
         """The units of z, lam and nu, each in the order of an OCP."""
         z, lam = np.ones(ocp.lower.size), np.ones(ocp.equality.size)
         z[ocp.states], z[ocp.inputs] = self.states, self.inputs

@@ -1,0 +1,134 @@
+"""`Nmpc.solve_many`: the solutions of `solve` to the last bit, and Ipopt's to its tolerance."""
+
+import threading
+
+import numpy as np
+import pytest
+from small_problems import limited, pendulum, tank
+
+from nmpcrl.control import Ipopt, Nmpc, SolverError
+from nmpcrl.control.batch import TEXT
+from nmpcrl.control.codegen.jit import load
+
+COUNT = 8
+PARTS = ("value", "features", "point", "iterations", "violation", "restarts", "status", "action")
+
+
+@pytest.fixture(scope="module")
+def nmpc() -> Nmpc:
+    """A pendulum, by riccati."""
+    return Nmpc(pendulum())
+
+
+def drawn(nmpc: Nmpc, count: int = COUNT, seed: int = 0):
+    """States, thetas, actions and data of a batch."""
+    rng, of = np.random.default_rng(seed), nmpc.problem
+    states = rng.normal(size=(count, nmpc.n)) * of.sizes[0]
+    thetas = of.theta * rng.uniform(0.9, 1.1, (count, of.theta.size))
+    data = None
+    if of.data_names:
+        data = {"wind": rng.normal(scale=0.05, size=(count, 7)), "target": rng.normal(size=2)}
+    return states, thetas, rng.uniform(nmpc.lower, nmpc.upper, (count, nmpc.m)), data
+
+
+def same(batch, solutions) -> None:
+    for name in PARTS:
+        expected = np.array([getattr(one, name) for one in solutions])
+        assert np.array_equal(getattr(batch, name), expected), name
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [Nmpc(pendulum()), Nmpc(tank(1e6)), Nmpc(pendulum(), solver="fatrop")],
+    ids=["riccati", "riccati in other units", "fatrop"],
+)
+def test_a_batch_holds_what_solve_finds(controller):
+    states, thetas, actions, data = drawn(controller)
+    each = [None] * COUNT
+    if data:
+        each = [{**data, "wind": data["wind"][k]} for k in range(COUNT)]
+
+    def alone(states, thetas, warm, actions=(None,) * COUNT):
+        given = zip(states, thetas, warm, actions, each, strict=True)
+        return [controller.solve(s, th, w, a, data=d) for s, th, w, a, d in given]
+
+    free = controller.solve_many(states, thetas, data=data, threads=2)
+    one_by_one = alone(states, thetas, [None] * COUNT)
+    same(free, one_by_one)
+    fixed = controller.solve_many(states, thetas, free, actions, data)
+    fixed_one_by_one = alone(states, thetas, one_by_one, actions)
+    same(fixed, fixed_one_by_one)
+    later = np.vstack([states[:4], free.states[4:, 1]])  # warm starts as they are, and shifted
+    moved = controller.solve_many(later, 1.01 * thetas, fixed, data=data, threads=1)
+    same(moved, alone(later, 1.01 * thetas, fixed_one_by_one))
+    assert np.array_equal(moved[2].states, moved.states[2])
+    assert (free.value <= fixed.value + 1e-6 * np.abs(free.value)).all()
+
+
+def test_a_batch_agrees_with_ipopt(nmpc):
+    states, thetas, _, data = drawn(nmpc, 20, seed=3)
+    batch, other = (
+        nmpc.solve_many(states, thetas, data=data),
+        Nmpc(nmpc.problem, solver=Ipopt(1e-10)),
+    )
+    found = other.solve_many(states, thetas, batch, data=data)  # the same minimum
+    assert batch.solved.all()
+    assert found.solved.all()
+    np.testing.assert_allclose(batch.value, found.value, rtol=1e-6)
+    np.testing.assert_allclose(batch.inputs, found.inputs, atol=1e-4)
+    np.testing.assert_allclose(batch.features, found.features, rtol=1e-4, atol=1e-4)
+
+
+def test_what_cannot_be_solved_is_marked_and_leaves_the_others_alone():
+    nmpc = Nmpc(limited(), solver="fatrop")  # whose hard rows no plan from the second state keeps
+    states = np.array([[0.1, 0.0], [0.0, 9.0], [np.nan, 0.0], [0.2, 0.0]])
+    batch = nmpc.solve_many(states, nmpc.problem.theta)
+    assert batch.status.tolist() == ["solved", "failed", "refused", "solved"]
+    assert np.isnan(batch.value[1:3]).all()
+    assert np.isnan(batch.inputs[1:3]).all()
+    assert batch[3].value == nmpc.solve(states[3], nmpc.problem.theta).value
+    with pytest.raises(SolverError, match="failed"):
+        batch[1]
+    assert nmpc.solve_many(states[[0, 0, 0, 3]], nmpc.problem.theta, batch).solved.all()
+    beyond = nmpc.solve_many(states, nmpc.problem.theta, actions=[7.0])
+    assert (beyond.status == "refused").all()
+
+
+def test_an_empty_batch_is_a_batch(nmpc):
+    batch = nmpc.solve_many(np.empty((0, 2)), nmpc.problem.theta)
+    assert batch.inputs.shape == (0, 6, 1)
+
+
+def test_a_shape_is_refused_with_the_one_to_give(nmpc):
+    states, thetas, actions, _ = drawn(nmpc, 3)
+    for given, said in (
+        ((states[0], thetas), r"states has shape \(2,\); it must be \(B, 2\)"),
+        ((states, thetas[:2]), r"thetas has shape \(2, 10\); it must be \(3, 10\) or \(10,\)"),
+        ((states, thetas, None, actions[:2]), r"actions has shape \(2, 1\)"),
+        ((states, thetas, nmpc.solve_many(states[:2], thetas[:2])), "2 rows; states has 3"),
+        ((states, thetas, None, None, {"wind": np.zeros((2, 7))}), r"it must be \(\) or \(3, 7\)"),
+        ((states, thetas, None, None, None, 0), "threads = 0 must be a whole number, 1 or more"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            nmpc.solve_many(*given)
+
+
+def test_python_runs_on_while_a_batch_is_solved(nmpc, monkeypatch):
+    states, thetas, _, _ = drawn(nmpc, 3000)
+    code, reports, ended, shares = load("many", {"__init__": TEXT}), [], threading.Event(), []
+
+    class Watched:
+        @staticmethod
+        def many(*given):
+            given[-1][:] = np.nan
+            reports.append(given[-1])
+            code.many(*given)
+            ended.set()
+
+    monkeypatch.setattr("nmpcrl.control.batch.load", lambda *_: Watched)
+    solving = threading.Thread(target=nmpc.solve_many, args=(states, thetas), kwargs={"threads": 1})
+    solving.start()
+    while not ended.wait(1e-3):
+        shares += [np.isfinite(report[:, 0]).mean() for report in reports]
+    solving.join()
+    assert any(0 < share < 1 for share in shares)  # never, where machine code holds Python's lock
