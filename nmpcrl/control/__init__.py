@@ -1,6 +1,7 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
 from nmpcrl.control.batch import Batch
+from nmpcrl.control.gradient import Gradient
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
 from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
@@ -12,6 +13,7 @@ __all__ = [
     "Batch",
     "DerivativeError",
     "Fatrop",
+    "Gradient",
     "Hard",
     "Ipopt",
     "Nmpc",

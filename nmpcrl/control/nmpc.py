@@ -18,6 +18,7 @@ from nmpcrl.control.batch import Batch, solve_many, stage_data, table
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.content import Described, key_of
 from nmpcrl.control.diagnosis import FARTHEST
+from nmpcrl.control.gradient import Gradient
 from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
@@ -220,8 +221,35 @@ class Nmpc(Described):
         variant = self._variant(solution)
         found: Matrix | None = variant.compiled(Compiled.feedback, solution)
         if found is None:
-            found = variant.dense(Sensitivity.plan, solution, in_state=True)[variant.ocp.inputs[0]]
+            found = variant.dense(Sensitivity.plan, solution, of=variant.in_state)[
+                variant.ocp.inputs[0]
+            ]
         return variant.units.inputs[:, None] * found / variant.units.states
+
+    def gradient(
+        self,
+        solution: Solution,
+        value: float = 1.0,
+        inputs: Matrix | None = None,
+        states: Matrix | None = None,
+    ) -> Gradient:
+        """The derivatives in state, theta, a given u_0 and data of J, a sum over the solution.
+
+        J = value V + sum_i inputs_i' u_i + sum_i states_i' x_i. Without weights it is V: then
+        `state` is dV/ds and `data` dV/dd. With `value` 0 and a single 1 in `inputs` it is an
+        entry of the plan: du/ds, du/dtheta and du/dd, at kinks as in `policy_jacobian`. By riccati
+        that is a sweep, compiled for the problem where it is first asked for.
+
+        Args:
+            solution: where.
+            value: the weight of the value.
+            inputs: the weights of u_0, ..., u_{N-1}, shape (N, m); 0 if absent.
+            states: the weights of x_0, ..., x_N, shape (N + 1, n); 0 if absent.
+
+        Raises:
+            DerivativeError: the plan has no derivative; V always has one.
+        """
+        return self._variant(solution).gradient(solution, value, inputs=inputs, states=states)
 
     def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import Diagnosis
+from nmpcrl.control.gradient import Backward, Gradient
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError
@@ -24,6 +25,39 @@ class Variant:
         self.ocp, self.units = ocp, Units(ocp)
         self.solver = solver.prepare(self.units.ocp)
         self.solve = self.solver.solve if self.units.trivial else self._solve_in_units
+
+    def gradient(self, solution: Solution, value: float, **weights: Matrix | None) -> Gradient:
+        """See `Nmpc.gradient`; `weights` are those of inputs and states."""
+        ocp, units, of = self.ocp, self.units, self.ocp.problem
+        inside, w = units.inside(solution), np.zeros(ocp.lower.size)
+        given = inside.primal, inside.parameters, inside.constraint_duals
+        found = value * self._backward.value_and_gradient(*given)[1]
+        for name, unit in (("inputs", units.inputs), ("states", units.states)):
+            place, one = getattr(ocp, name), weights[name]
+            if one is not None and np.shape(one) != place.shape:
+                raise ValueError(f"{name} has shape {np.shape(one)}; it must be {place.shape}")
+            w[place] = 0.0 if one is None else one * unit
+        if w.any():
+            step = self.compiled(Compiled.adjoint, solution, w)
+            if step is None:
+                found += w @ self.dense(Sensitivity.plan, solution, of=self._backward)
+            else:
+                found += self._backward.along(*given, step, w)
+        sizes = (
+            of.states,
+            of.names.size,
+            ocp.fixed_action.size,
+            of.data_names.size * len(ocp.states),
+        )
+        state, theta, action, data = np.split(found, np.cumsum(sizes)[:-1])
+        data = data.reshape(len(ocp.states), -1)
+        parts = {name: of.data_names.part(name, data) for name in of.data_names}
+        return Gradient(
+            state / units.states,
+            theta,
+            action / units.inputs[: action.size],
+            {name: part.reshape(-1, *of.data_names[name]) for name, part in parts.items()},
+        )
 
     @property
     def machine(self) -> Compiled | None:
@@ -61,15 +95,16 @@ class Variant:
         function: Callable[..., Any],
         solution: Solution,
         *,
-        in_state: bool = False,
+        of: Sensitivity | None = None,
         **how: Any,
     ) -> Any:
-        """A function of `Sensitivity`, in theta or `in_state`; DerivativeError if there is none."""
+        """A function of `Sensitivity`, in theta if not `of` another; DerivativeError if none."""
         inside = self.units.inside(solution)
         duals = inside.constraint_duals, inside.bound_duals
-        of = self._in_state if in_state else self._sensitivity
         try:
-            return function(of, inside.primal, inside.parameters, *duals, **how)
+            return function(
+                of or self._sensitivity, inside.primal, inside.parameters, *duals, **how
+            )
         except np.linalg.LinAlgError as error:
             raise DerivativeError(str(error), solution.state, solution.theta) from error
 
@@ -82,7 +117,11 @@ class Variant:
         return Sensitivity(self.units.ocp)
 
     @cached_property
-    def _in_state(self) -> Sensitivity:
+    def _backward(self) -> Backward:
+        return Backward(self.units.ocp)
+
+    @cached_property
+    def in_state(self) -> Sensitivity:
         """Derivatives in the initial state in place of theta."""
         ocp = self.units.ocp
         return Sensitivity(replace(ocp, theta=ocp.parameters[: ocp.problem.states]))

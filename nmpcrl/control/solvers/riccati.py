@@ -42,6 +42,10 @@ TEXTS = {  # compiled beside `model`; read with the other modules, so that an ed
     name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
     for name in ("codes", "kernel", "find", "slopes")
 }
+OF_PLAN = {  # what `slopes` is made of, without `slopes`
+    "slopes": TEXTS["slopes"].partition("\n\nSIGNATURE")[0],
+    "adjoint": files(__package__).joinpath("adjoint.py").read_text("utf-8"),
+}
 ABSURD = 1e24  # no value is larger
 UNBOUNDED = 1e20  # stands for an input without a bound
 
@@ -60,7 +64,7 @@ class Arguments(NamedTuple):
 
 
 def machine_code(problem: Problem, entry: str = "find") -> Any:
-    """The function `find.find`, or `slopes.slopes`, compiled for a problem once.
+    """The function `find.find`, `slopes.slopes` or `adjoint.adjoint`, compiled for a problem once.
 
     Raises:
         CannotCompile: numba is missing, or the problem holds an operation that is not known.
@@ -69,7 +73,8 @@ def machine_code(problem: Problem, entry: str = "find") -> Any:
         texts = {
             "__init__": f"from .{entry} import {entry}\n",
             "model": stages.write(problem),
-            **{name: TEXTS[name] for name in ("codes", "kernel", entry)},
+            **{name: TEXTS[name] for name in ("codes", "kernel")},
+            **(OF_PLAN if entry == "adjoint" else {entry: TEXTS[entry]}),
         }
         notice = NOTICE if entry == "find" else PLAN_NOTICE
         problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
@@ -198,6 +203,16 @@ class Compiled:
         d, shape = solution.theta.size, (self._problem.inputs, self._problem.states)
         found = self._slopes(solution, np.zeros(d), self._no_action, more=shape[0] * shape[1])
         return None if found is None else found[d:].reshape(shape)
+
+    def adjoint(self, solution: Solution, weights: Vector) -> Vector | None:
+        """The step of z and lam by `adjoint.adjoint`, for weights of z; None likewise."""
+        if solution.took_over:
+            return None
+        action = solution.action if self._fixed else self._no_action
+        given = (solution.state, solution.theta, action, self._fixed, solution.point)
+        out = np.zeros(self._ocp.lower.size + self._ocp.equality.size)
+        code = machine_code(self._problem, "adjoint")
+        return out if code(solution.data, *self._rest, *given, weights, out) else None
 
     def _slopes(
         self, solution: Solution, along: Vector, of_action: Vector, *, more: int = 0

@@ -1,0 +1,107 @@
+"""`Nmpc.gradient`: derivatives of value and plan in state, theta, u_0 and data, by differences."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from differences import active
+from small_problems import limited, pendulum, tank
+
+from nmpcrl.control import Fatrop, Nmpc, Riccati, Solution, SolverError
+
+STEP = 1e-5
+
+
+def asked(nmpc: Nmpc, rng: np.random.Generator, *, fixed: bool) -> dict[str, Any]:
+    """What a solve is given."""
+    of = nmpc.problem
+    known = {name: of.data_names.part(name, of.data) for name in of.data_names}
+    data = {name: one.reshape(-1, *of.data_names[name]) for name, one in known.items()}
+    return {
+        "state": rng.uniform(-0.9, 0.9, nmpc.n) * of.sizes[0],
+        "theta": of.theta + 0.1 * rng.uniform(-1, 1, of.theta.size),
+        "action": 0.5 * rng.uniform(nmpc.lower, nmpc.upper) if fixed else None,
+        "data": {name: one + 0.05 * rng.normal(size=one.shape) for name, one in data.items()},
+    }
+
+
+def directions(nmpc: Nmpc, given: dict[str, Any], rng: np.random.Generator) -> Iterator[Any]:
+    """A direction of each thing that is given: its name, and it moved along so far."""
+
+    def moved(part: str, along: Any) -> Callable[[float], dict[str, Any]]:
+        return lambda length: given | {part: given[part] + length * along}
+
+    sizes = {"state": nmpc.problem.sizes[0], "action": nmpc.problem.sizes[1]}
+    for part in ("state", "theta", "action"):
+        if given[part] is not None:
+            along = rng.normal(size=given[part].shape) * sizes.get(part, 1.0)
+            yield part, along, moved(part, along)
+    for name, one in given["data"].items():
+        along = rng.normal(size=one.shape)
+        data = lambda length, name=name, by=along: {name: given["data"][name] + length * by}  # noqa: E731
+        yield name, along, lambda by, data=data: given | {"data": given["data"] | data(by)}
+
+
+def difference(nmpc: Nmpc, here: Solution, number: Any, moved: Any) -> float | None:
+    """The central difference of a number; None across a kink."""
+    above, below = (nmpc.solve(**moved(length), warm_start=here) for length in (STEP, -STEP))
+    if active(here) is None or {active(above), active(below)} != {active(here)}:
+        return None
+    return float(number(above) - number(below)) / (2 * STEP)
+
+
+@pytest.mark.parametrize("solver", [Riccati(1e-11), Fatrop(1e-10)], ids=["riccati", "fatrop"])
+@pytest.mark.parametrize("make", [pendulum, limited, partial(tank, 1e-6)], ids=["P", "H", "T"])
+def test_derivatives_along_any_direction_are_differences(make, solver, request):
+    if make is not pendulum:
+        request.getfixturevalue("interpreted")
+    nmpc, rng, compared = Nmpc(make(), solver=solver), np.random.default_rng(0), Counter()
+    for k in range(8):
+        given = asked(nmpc, rng, fixed=k % 2 == 1)
+        try:
+            here = nmpc.solve(**given)
+        except SolverError:  # fatrop, where no plan keeps to hard rows
+            continue
+        w, v = (rng.normal(size=one.shape) for one in (here.inputs, here.states))
+        w, v = w / nmpc.problem.sizes[1], v / nmpc.problem.sizes[0]
+
+        def plan(one, w=w, v=v):
+            return (w * one.inputs).sum() + (v * one.states).sum()
+
+        kinds = {
+            "value": (nmpc.gradient(here), lambda one: one.value),
+            "plan": (nmpc.gradient(here, value=0.0, inputs=w, states=v), plan),
+        }
+        for kind, (found, number) in kinds.items():
+            for name, along, moved in directions(nmpc, given, rng):
+                slope = None if here.violation else difference(nmpc, here, number, moved)
+                if slope is not None:
+                    part = found.data[name] if name in found.data else getattr(found, name)
+                    assert (part * along).sum() == pytest.approx(slope, rel=1e-4, abs=2e-5)
+                    compared[kind, name] += 1
+        np.testing.assert_allclose(kinds["value"][0].theta, here.features, rtol=1e-6, atol=1e-8)
+    assert len(compared) == 2 * (3 + len(nmpc.problem.data_names))
+    assert min(compared.values()) >= 2, compared
+
+
+def test_the_entries_of_the_plan_are_the_policys_derivatives():
+    nmpc = Nmpc(pendulum(), solver=Riccati(1e-11))
+    here, first = nmpc.solve([0.3, -0.2], nmpc.problem.theta), np.zeros((6, 1))
+    first[0] = 1.0
+    found = nmpc.gradient(here, value=0.0, inputs=first)
+    np.testing.assert_allclose([found.state], nmpc.policy_feedback(here), rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose([found.theta], nmpc.policy_jacobian(here), rtol=1e-5, atol=1e-7)
+    assert found.action.shape == (0,)
+    weights = np.zeros(here.primal.size)
+    assert nmpc.machine(fix_action=False).adjoint(here, weights) is not None  # no dense algebra
+    assert found.data["target"].shape == (7, 2)
+
+
+def test_weights_of_another_shape_are_refused():
+    nmpc = Nmpc(pendulum(), solver="fatrop")
+    here = nmpc.solve([0.3, -0.2], nmpc.problem.theta)
+    with pytest.raises(ValueError, match=r"inputs has shape \(1,\); it must be \(6, 1\)"):
+        nmpc.gradient(here, inputs=np.ones(1))
