@@ -334,6 +334,45 @@ class Problem(Described):
         """Functions compiled for this problem, by name."""
         return {}
 
+    def step(
+        self, x: Any, u: Any, theta: Any = None, *, data: Mapping[str, Any] | None = None
+    ) -> Vector:
+        """The model's next state f(x, u, theta, d), shape (n,): a plant, with a theta of its own.
+
+        `theta` has shape (d,), its start if absent, and `data` are arrays of one stage by name.
+        `problem.step(x, u, problem.vector(mass=1.3))` has one parameter that the plan's does not.
+        """
+        found: Vector = self._stage_of(x, u, theta, data)[0].full().ravel()
+        return found
+
+    def cost(
+        self, x: Any, u: Any, theta: Any = None, *, data: Mapping[str, Any] | None = None
+    ) -> float:
+        """What a stage of the plan costs: l(x, u, theta, d) + W' max(h(x, u, theta, d), 0).
+
+        The rows h are the soft ones that hold at any stage before N; arguments as in `step`.
+        """
+        return float(self._stage_of(x, u, theta, data)[1])
+
+    def _stage_of(self, x: Any, u: Any, theta: Any, data: Mapping[str, Any] | None) -> Any:
+        theta = self.theta if theta is None else theta
+        numbers = (
+            spread("x", x, (self.states,), "a state"),
+            spread("u", u, (self.inputs,), "an input"),
+            spread("theta", theta, self.theta.shape, "a parameter"),
+        )
+        return self._stage(*numbers, self.stage_data(data)[0])
+
+    @cached_property
+    def _stage(self) -> ca.Function:
+        """(x, u, theta, data of a stage with all lines) -> next state, cost with that of rows."""
+        (x, u, theta, *_), d = self.expressions, ca.SX.sym("d", self.data_names.size)
+        own, line = d[: self.own_names.size], ca.DM.zeros(self.width)
+        next_x, cost, *_ = self._function(x, u, theta, own, line)
+        weights = np.where(self.active[:-1].any(axis=0) & self.soft, self.weights, 0.0)
+        price = ca.dot(ca.DM(weights), ca.fmax(self.rows(x, u, theta, d), 0))
+        return ca.Function("stage", [x, u, theta, d], [next_x, cost + price])
+
     def split(self, theta: Vector) -> dict[str, Any]:
         """The parts of theta, or of a gradient in theta, by name."""
         return self.names.split(np.asarray(theta, float))
