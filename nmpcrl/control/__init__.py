@@ -4,6 +4,7 @@ from nmpcrl.control.batch import Batch
 from nmpcrl.control.gradient import Gradient
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
+from nmpcrl.control.policy import Policy
 from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError, Status
 from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
@@ -20,6 +21,7 @@ __all__ = [
     "Obstacle",
     "Parameter",
     "Plant",
+    "Policy",
     "Problem",
     "Riccati",
     "Series",

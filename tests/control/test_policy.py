@@ -1,0 +1,76 @@
+"""A policy, as users of other libraries call it."""
+
+import pickle
+
+import numpy as np
+import pytest
+from small_problems import pendulum
+
+from nmpcrl.control import Nmpc, Policy
+from nmpcrl.learning import as_gymnasium, evaluate
+
+STATE, STEPS = np.array([0.6, -0.4]), 6
+
+
+@pytest.fixture(scope="module")
+def nmpc() -> Nmpc:
+    return Nmpc(pendulum(), solver="fatrop")
+
+
+def moved(nmpc):
+    """The plan's own model and costs as a plant."""
+    problem = nmpc.problem
+    return lambda x, u, rng: (problem.step(x, u), problem.cost(x, u), False)
+
+
+@pytest.fixture(scope="module")
+def theta(nmpc):
+    return nmpc.problem.vector(rate=1.5)
+
+
+def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before(nmpc, theta):
+    policy = Policy(nmpc, theta)
+    for _ in range(2):
+        policy.reset()
+        loop = evaluate(nmpc, theta, STEPS, plant=moved(nmpc), start=STATE)
+        assert [policy(state).tolist() for state in loop.states] == loop.actions.tolist()
+
+
+def test_make_step_takes_and_gives_columns_as_do_mpc(nmpc, theta):
+    action = Policy(nmpc, theta).make_step(STATE[:, None])
+    assert action.shape == (1, 1)
+    assert action[:, 0] == nmpc.solve(STATE, theta).action
+
+
+def test_stable_baselines_evaluates_a_policy_to_the_cost_of_a_rollout(nmpc, theta):
+    pytest.importorskip("stable_baselines3")
+    from stable_baselines3.common.evaluation import evaluate_policy
+    from stable_baselines3.common.monitor import Monitor
+
+    env = Monitor(as_gymnasium(nmpc, plant=moved(nmpc), start=STATE, steps=STEPS))
+    reward, spread = evaluate_policy(Policy(nmpc, theta), env, n_eval_episodes=2)
+    loop = evaluate(nmpc, theta, STEPS, plant=moved(nmpc), start=STATE)
+    assert reward == pytest.approx(-loop.cost)
+    assert spread == pytest.approx(0, abs=1e-12)
+
+
+def test_predict_takes_many_observations_and_begins_anew_with_an_episode(nmpc, theta):
+    policy = Policy(nmpc, theta)
+    actions, plans = policy.predict(np.array([STATE, -STATE]))
+    assert actions.shape == (2, 1)
+    again, _ = policy.predict(np.array([STATE, -STATE]), plans, np.array([True, False]))
+    cold, warm = nmpc.solve(STATE, theta), nmpc.solve(-STATE, theta, plans[1])
+    assert again.ravel().tolist() == [*cold.action, *warm.action]
+    assert policy.predict(STATE)[0].shape == (1,)
+
+
+def test_a_policy_is_saved_and_loaded_to_the_last_bit(nmpc, theta, tmp_path):
+    policy = Policy(nmpc, theta)
+    wanted = policy(STATE)
+    policy.save(tmp_path / "policy")
+    loaded = Policy.load(tmp_path / "policy")
+    assert loaded.solution is None
+    assert loaded(STATE).tolist() == wanted.tolist()
+    (tmp_path / "other").write_bytes(pickle.dumps({}))
+    with pytest.raises(ValueError, match="holds a dict; it must hold a Policy"):
+        Policy.load(tmp_path / "other")
