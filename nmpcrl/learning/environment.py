@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, cast
 
 import numpy as np
@@ -50,7 +51,8 @@ def environment(
             controller plans.
         plant: a `Plant`, whose cost is the task's; or (state, action, rng) -> (next state, cost,
             end), for any other, such as a disturbed one, with any cost and end of its own. A fourth
-            value, if there is one, ends the episode in a state that keeps its worth. Or a
+            value, if there is one, ends the episode in a state that keeps its worth. A function of
+            (state, action, rng, t) is told the time, the steps since the start. Or a
             `gymnasium.Env`. The plant that plans if absent.
         start: a state, or rng -> state; the task's if absent. With the same start, no noise in the
             plant and no exploration, all seeds are one run: that they agree says nothing.
@@ -73,8 +75,11 @@ def environment(
     if nmpc and task and isinstance(plant, Plant):
         step = charged(plant, task, nmpc)
     else:
-        refuse_other(PLANT, plant, 3)
-        step = checked(cast(StepFunction, plant), states)
+        own = cast(StepFunction, plant)
+        if callable(own) and mismatch(own, (None,) * 3) and not mismatch(own, (None,) * 4):
+            own, start = timed(own, start)
+        refuse_other(PLANT, own, 3)
+        step = checked(own, states)
     if callable(start):
         begin = start
         refuse_other("start is called as start(rng) and returns a state", begin, 1)
@@ -200,6 +205,18 @@ def of_gymnasium(
         return observation, -float(reward), terminated, truncated
 
     return step, begin
+
+
+def timed(plant: Callable[..., Any], start: Start) -> tuple[StepFunction, Start]:
+    """A plant that is told the time, as one of three arguments, and a start that sets it to 0."""
+    clock = count()
+
+    def begin(rng: np.random.Generator) -> Any:
+        nonlocal clock
+        clock = count()
+        return start(rng) if callable(start) else start
+
+    return lambda state, action, rng: plant(state, action, rng, next(clock)), begin
 
 
 def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:

@@ -12,6 +12,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
+from nmpcrl.control.vectors import positive_integer
 from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.environment import (
     Data,
@@ -77,20 +78,42 @@ def count_episodes(episodes: int, steps: int) -> Counts:
     return np.repeat(np.arange(episodes), steps).reshape(episodes, steps)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Exploration:
-    """The noise of Eq. (5), drawn in advance so that every learner of a seed meets the same."""
+    """The noise of Eq. (5), drawn in advance so that every learner of a seed meets the same.
+
+    `Exploration(episodes=40, steps=60, deviation=0.1)` draws normal noise that does not decay.
+    """
 
     noise: Matrix  # epsilon, shape (episodes, steps, m)
-    scale: NDArray[np.floating]  # c_epsilon^k, shape (episodes, steps)
+    scale: NDArray[np.floating]  # c_epsilon^k, shape (episodes, steps); 1 if absent
 
-    def __post_init__(self) -> None:
-        noise, scale = np.shape(self.noise), np.shape(self.scale)
-        if len(noise) != 3 or scale != noise[:2]:
+    def __init__(
+        self, noise: Any = None, scale: Any = None, *, episodes: int = 1, steps: int = 100,
+        deviation: Any = 0.1, seed: int = 0, first: int = 0,
+    ) -> None:  # fmt: skip
+        """Take noise and scale, or draw noise of a standard deviation, an array of one an input.
+
+        Each episode has a stream of its own, so that fewer episodes have the same noise, and
+        episodes from `first` on go on where an earlier run of as many ended.
+        """
+        if noise is None:
+            count, steps = positive_integer("episodes", episodes), positive_integer("steps", steps)
+            spread = np.atleast_1d(np.array(deviation, float))
+            if spread.ndim != 1 or not ((spread >= 0) & (spread < np.inf)).all():
+                raise ValueError(
+                    f"deviation = {deviation} must be a finite number, 0 or more, or one an input"
+                )
+            streams = (np.random.SeedSequence(seed, spawn_key=(0, first + e)) for e in range(count))
+            draws = (np.random.default_rng(one).normal for one in streams)
+            noise = np.array([draw(scale=spread, size=(steps, spread.size)) for draw in draws])
+        scale = np.ones(np.shape(noise)[:2]) if scale is None else scale
+        if np.ndim(noise) != 3 or np.shape(scale) != np.shape(noise)[:2]:
             raise ValueError(
-                f"noise has shape {noise} and scale {scale}: they must be (episodes, steps, inputs)"
-                " and (episodes, steps)"
+                f"noise has shape {np.shape(noise)} and scale {np.shape(scale)}: they must be"
+                " (episodes, steps, inputs) and (episodes, steps)"
             )
+        vars(self).update(noise=noise, scale=scale)
 
     @classmethod
     def draw(
