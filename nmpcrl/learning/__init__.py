@@ -9,6 +9,7 @@ from nmpcrl.learning.batches import batched, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
 from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.gymnasium import as_gymnasium
+from nmpcrl.learning.learn import Learned, learn
 from nmpcrl.learning.learners import (
     Learner,
     Update,
@@ -44,10 +45,11 @@ from nmpcrl.learning.updates import (
 
 __all__ = [
     "Bootstrap", "Descent", "Diverged", "Episode", "Exploration", "GaussNewton", "Imitation",
-    "Learner", "NextValue", "QNetwork", "Rollout", "SecondSolve", "Step", "Transition",
+    "Learned", "Learner", "NextValue", "QNetwork", "Rollout", "SecondSolve", "Step", "Transition",
     "TrustRegion", "Update", "UpdateRule", "Weights", "as_gymnasium", "auxiliary_step", "batched",
     "count_episodes", "count_steps", "curvature_correction", "deep_expected_sarsa", "episodes",
     "evaluate", "expected_sarsa", "frozen", "gradient_expected_sarsa", "gradient_td_step",
-    "gradient_tdc", "lstd_q", "policy_gradient", "project", "q_learning", "random_direction",
-    "regularized_deep_expected_sarsa", "semi_gradient_step", "step_matched", "td_error", "train",
+    "gradient_tdc", "learn", "lstd_q", "policy_gradient", "project", "q_learning",
+    "random_direction", "regularized_deep_expected_sarsa", "semi_gradient_step", "step_matched",
+    "td_error", "train",
 ]  # fmt: skip

@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl import learning
 from nmpcrl.bench.learners import ratio as ratio_of
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import published
@@ -171,9 +170,8 @@ def test_the_example_trains_a_plant_of_the_readers_own_as_the_text_says(capsys):
 
 def test_the_second_example_learns_each_parameter_of_its_problem(capsys):
     names = {"ca": ca, "np": np, "Nmpc": partial(Nmpc, solver="fatrop")}  # which compiles nothing
-    names |= {name: getattr(learning, name) for name in ("Exploration", "Weights", "train")}
     exec(EXAMPLES[1], names)
-    learned, problem = names["last"].weights.theta, names["problem"]
+    learned, problem = names["result"].vector, names["problem"]
     assert set(problem.split(learned)) == {"A", "B", "b", "margin"}
     assert all((learned != problem.theta).reshape(-1)[:4])
     assert np.isfinite(learned).all()
