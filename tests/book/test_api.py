@@ -131,7 +131,7 @@ def imports(notebook: Path) -> set[str]:
 @pytest.mark.parametrize("page", sorted((ROOT / "book").glob("your_*.ipynb")), ids=lambda p: p.stem)
 def test_a_notebook_of_ones_own_uses_public_names_only(page):
     homes = {module(name) for name in LISTED}
-    known = {"numpy", "pandas", "casadi", "functools.partial", "io.StringIO"}
+    known = {"numpy", "pandas", "casadi", "torch", "functools.partial", "io.StringIO"}
     known |= {"IPython.display.HTML"}
     assert imports(page) - set(LISTED) - homes <= known
 

@@ -1,0 +1,116 @@
+"""An NMPC as a layer of PyTorch: nothing else of the library imports this module.
+
+It belongs to no room, because all of it is `control` with torch's names.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from nmpcrl.control import DerivativeError, Nmpc
+
+
+class Layer(torch.nn.Module):
+    """The value, the action and the plan of an NMPC, differentiable in all that it is given.
+
+    It has no weights of its own: theta, states and data may each come out of a network. Numbers
+    are solved in double precision on the CPU, whatever they come in, and the results are of double
+    precision. Second derivatives are not available.
+    """
+
+    def __init__(self, nmpc: Nmpc, threads: int | None = None) -> None:
+        """Take a controller, and the number of threads as in `Nmpc.solve_many`."""
+        super().__init__()
+        self.nmpc, self.threads = nmpc, threads
+
+    def forward(
+        self,
+        states: Tensor,
+        theta: Tensor,
+        data: Mapping[str, Tensor] | None = None,
+        *,
+        action: Tensor | None = None,
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """V(s), u_0 and u_0, ..., u_{N-1} of B states; Q(s, a) where an action is given.
+
+        Where a solve fails, all three are nan and have no gradient: `mask = value.isfinite()` says
+        where they may be used, as in `(value[mask] - target[mask]).square().mean()`. Where a plan
+        has no derivative, as at a point without curvature, the value alone has a gradient.
+
+        Args:
+            states: shape (B, n).
+            theta: shape (B, d), or (d,) for all.
+            data: by name, shape (B, N + 1, ...); axes in front may be left out where all are alike.
+            action: u_0, shape (B, m); free if absent.
+
+        Returns:
+            Shapes (B,), (B, m) and (B, N, m).
+
+        Raises:
+            ValueError: a shape is another.
+        """
+        of, count, device = self.nmpc.problem, len(states), states.device
+        names, given = tuple(data or ()), [states, theta]
+        shapes = [(count, of.states), (count, of.theta.size)]
+        if action is not None:
+            given.append(action)
+            shapes.append((count, of.inputs))
+        for name in names:
+            given.append(torch.as_tensor((data or {})[name]))
+            shapes.append((count, of.horizon + 1, *of.data_names[name]))
+        called = ("states", "theta", "action")[: len(given) - len(names)] + names
+        for k, (tensor, shape) in enumerate(zip(given, shapes, strict=True)):
+            try:
+                given[k] = tensor.to("cpu", torch.float64).expand(shape)
+            except RuntimeError:
+                was = tuple(tensor.shape)
+                raise ValueError(f"{called[k]} has shape {was}; it must be {shape}") from None
+        value, plan = _Solve.apply(self, names, *given)  # type: ignore[no-untyped-call]
+        value, plan = value.to(device), plan.to(device)
+        return value, plan[:, 0], plan
+
+
+class _Solve(torch.autograd.Function):
+    """Value and plan, and their derivatives by `Nmpc.gradient`."""
+
+    @staticmethod
+    def forward(
+        ctx: Any, layer: Layer, names: tuple[str, ...], *given: Tensor
+    ) -> tuple[Tensor, ...]:
+        """Solve for states, theta, actions where there are some, and data of these names."""
+        arrays = [tensor.detach().numpy() for tensor in given]
+        asked, data = arrays[: len(arrays) - len(names)], arrays[len(arrays) - len(names) :]
+        batch = layer.nmpc.solve_many(
+            asked[0],
+            asked[1],
+            actions=asked[2] if len(asked) > 2 else None,
+            data=dict(zip(names, data, strict=True)),
+            threads=layer.threads,
+        )
+        ctx.nmpc, ctx.batch, ctx.names = layer.nmpc, batch, names
+        ctx.shapes = [one.shape for one in arrays]
+        return torch.tensor(batch.value), torch.tensor(batch.inputs)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, of_value: Tensor, of_plan: Tensor) -> tuple[Any, ...]:
+        """One backward sweep for each state that was solved."""
+        found, names = [np.zeros(shape) for shape in ctx.shapes], ctx.names
+        weights = zip(of_value.tolist(), of_plan.numpy(), strict=True)
+        for k, (solution, (value, inputs)) in enumerate(zip(ctx.batch, weights, strict=True)):
+            if solution is None:
+                continue
+            try:
+                rates = ctx.nmpc.gradient(solution, value, inputs)
+            except DerivativeError:
+                rates = ctx.nmpc.gradient(solution, value)
+            parts = [rates.state, rates.theta, rates.action, *map(rates.data.get, names)]
+            if len(parts) > len(found):  # no action was given
+                del parts[2]
+            for one, part in zip(found, parts, strict=True):
+                one[k] = part
+        return None, None, *(torch.from_numpy(one) for one in found)
