@@ -48,7 +48,7 @@ class Batch:
     data: NDArray[np.float64]  # d_0, ..., d_N: shape (B, N + 1, size), or (1, N + 1, size)
     ocp: Ocp
 
-    @property
+    @cached_property
     def solved(self) -> NDArray[np.bool_]:
         """Whether an optimum was found, shape (B,)."""
         found: NDArray[np.bool_] = ~np.isin(self.status, (FAILED, REFUSED))
