@@ -350,7 +350,8 @@ class Problem(Described):
     ) -> float:
         """What a stage of the plan costs: l(x, u, theta, d) + W' max(h(x, u, theta, d), 0).
 
-        The rows h are the soft ones that hold at any stage before N; arguments as in `step`.
+        The rows h are the soft ones that hold at any stage before N; arguments as in `step`. A
+        plant that charges a row at x is learned on with plans that do so at stage 0, too.
         """
         return float(self._stage_of(x, u, theta, data)[1])
 
