@@ -81,16 +81,19 @@ def test_a_failed_solve_is_masked_and_has_no_gradient():
     assert theta.grad.isfinite().all()
 
 
-def test_a_network_in_single_precision_learns_through_one_theta_for_all():
-    layer = Layer(Nmpc(pendulum(), solver="fatrop"))
-    states = torch.tensor([[0.3, 0.1], [-0.2, 0.4]])
-    theta = torch.tensor(layer.nmpc.problem.theta, dtype=torch.float32, requires_grad=True)
+@pytest.mark.parametrize("solver", ["riccati", "fatrop"])
+def test_a_network_in_single_precision_learns_through_one_theta_for_all(solver):
+    layer = Layer(Nmpc(pendulum(), solver=solver))
+    nmpc, states = layer.nmpc, torch.tensor([[0.3, 0.1], [-0.2, 0.4]])
+    theta = torch.tensor(nmpc.problem.theta, dtype=torch.float32, requires_grad=True)
     value, _, plan = layer(states, theta)
     assert value.dtype == plan.dtype == torch.float64
-    value.sum().backward()
+    (value.sum() + 2 * plan.sum()).backward()
     assert theta.grad.dtype == torch.float32
-    each = layer.nmpc.solve_many(states.numpy(), theta.detach().numpy())
-    np.testing.assert_allclose(theta.grad, each.features.sum(0), rtol=1e-4, atol=1e-5)
+    known = theta.detach().numpy()
+    each = [nmpc.solve(state, known) for state in states.numpy()]
+    expected = sum(nmpc.gradient(one, inputs=2 * np.ones((6, 1))).theta for one in each)
+    np.testing.assert_allclose(theta.grad, expected, rtol=1e-5, atol=1e-6)
 
 
 def test_a_shape_is_refused_with_the_one_to_give():

@@ -145,7 +145,7 @@ def solve_many(
 def table(name: str, value: Any, size: int, count: int | None = None) -> Matrix:
     """A copy of rows of this size; with a `count`, so many, or one row for all."""
     try:
-        rows = np.array(value, dtype=float)
+        rows = np.array(value, dtype=float, order="C")  # machine code takes no other
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be an array of rows of {size} numbers") from None
     if count is not None and rows.shape == (size,):
