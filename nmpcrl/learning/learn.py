@@ -27,7 +27,7 @@ from nmpcrl.learning.learners import (
     q_learning,
 )
 from nmpcrl.learning.policy_gradient import policy_gradient
-from nmpcrl.learning.remedies import judged_theta
+from nmpcrl.learning.remedies import Best, judged_theta
 from nmpcrl.learning.remedies import undo as undone
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, Exploration, absurd
@@ -119,13 +119,14 @@ def learn(
     base = _learner(nmpc, learner, options)
     if resume is not None and theta is not None:
         raise ValueError("a resumed run begins with its own theta: leave theta= out")
+    if resume is not None and isinstance(resume.weights.memory, Best) != undo:
+        raise ValueError(f"the run to resume had undo={not undo}: give it again")
     seed, done = (resume.seed, resume.episodes) if resume else (seed, 0)
     rng = deepcopy(resume.rng) if resume else stream(seed, 1)
     first = nmpc.problem.theta if theta is None else theta
     weights = resume.weights if resume else Weights(np.array(first, float))
-    explore = Exploration(
-        episodes=episodes, steps=steps, deviation=_deviation(nmpc, deviation), seed=seed, first=done
-    )
+    noise = _deviation(nmpc, deviation)
+    explore = Exploration(episodes=episodes, steps=steps, deviation=noise, seed=seed, first=done)
     around: dict[str, Any] = {"plant": plant, "start": start, "data": data}
     costs = [*resume.costs] if resume else []
     least = Bending(nmpc.problem).least
@@ -166,8 +167,8 @@ def learn(
     at = [(history["action"] == side).mean(axis=0) for side in (nmpc.lower, nmpc.upper)]
     if (np.minimum(*at) > CLIPPED).any():
         warn("clipped", f"shares of {short(at[0])} and {short(at[1])} of the actions lie at the"
-             f" lower and upper bounds, where noise is clipped: deviation="
-             f"{short(_deviation(nmpc, deviation))} may be too large")  # fmt: skip
+             f" lower and upper bounds, where noise is clipped: deviation={short(noise)} may be too"
+             " large")  # fmt: skip
     return Learned(
         nmpc, weights, history, np.array(costs), diverged, (*said.values(),), done + len(found),
         seed, rng,
@@ -231,8 +232,6 @@ def _negative(nmpc: Nmpc, least: Vector, episode: Episode) -> str:
 
 def _history(found: list[Episode], resume: Learned | None) -> dict[str, Any]:
     """The columns of all episodes, one array each, behind those of an earlier run."""
-    numbers = {"episode": np.repeat([one.number for one in found], [one.steps for one in found])}
-    columns = {name: np.concatenate([one.columns[name] for one in found]) for name in
-               found[0].columns}  # fmt: skip
-    new = numbers | columns
+    new = {"episode": np.repeat([one.number for one in found], [one.steps for one in found])}
+    new |= {name: np.concatenate([one.columns[name] for one in found]) for name in found[0].columns}
     return {k: np.concatenate([resume.history[k], v]) for k, v in new.items()} if resume else new

@@ -219,3 +219,5 @@ def test_options_need_a_name_noise_needs_bounds_and_a_resumed_run_has_its_theta(
     done = learn(nmpc, episodes=1, steps=2, **WORLD)
     with pytest.raises(ValueError, match="leave theta= out"):
         learn(nmpc, theta=[1, 1, 0], resume=done, **WORLD)
+    with pytest.raises(ValueError, match="the run to resume had undo=False"):
+        learn(nmpc, undo=True, resume=done, **WORLD)
