@@ -53,7 +53,7 @@ class Backward(Sensitivity):
         both = ca.vertcat(slope, ca.gradient(self._lagrangian, ocp.theta))
         moved = ca.jtimes(both, ca.vertcat(ocp.variables, self._lam), step)
         pulled, found = moved[: n + m] + w[given], moved[n + m :]
-        found[:n] += pulled[:n]
         at = n + ocp.problem.names.size
-        found[at : at + m] += pulled[n:]
+        for k, one in zip([*range(n), *range(at, at + m)], ca.vertsplit(pulled), strict=True):
+            found[k] += one
         return ca.Function("along", [*self._arguments, step, w], [found])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from differences import active
-from small_problems import limited, pendulum, tank
+from small_problems import drawn, limited, pendulum, tank
 
 from nmpcrl.control import Fatrop, Nmpc, Riccati, Solution, SolverError
 
@@ -54,7 +54,11 @@ def difference(nmpc: Nmpc, here: Solution, number: Any, moved: Any) -> float | N
 
 
 @pytest.mark.parametrize("solver", [Riccati(1e-11), Fatrop(1e-10)], ids=["riccati", "fatrop"])
-@pytest.mark.parametrize("make", [pendulum, limited, partial(tank, 1e-6)], ids=["P", "H", "T"])
+@pytest.mark.parametrize(
+    "make",
+    [pendulum, limited, partial(tank, 1e-6), partial(drawn, 11)],
+    ids=["P", "H", "T", "one state"],
+)
 def test_derivatives_along_any_direction_are_differences(make, solver, request):
     if make is not pendulum:
         request.getfixturevalue("interpreted")
