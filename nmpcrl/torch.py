@@ -44,8 +44,9 @@ class Layer(torch.nn.Module):
         Args:
             states: shape (B, n).
             theta: shape (B, d), or (d,) for all.
-            data: by name, shape (B, N + 1, ...); axes in front may be left out where all are alike.
-            action: u_0, shape (B, m); free if absent.
+            data: by name, shape (B, N + 1, ...); (N + 1, ...) for all states, or (...) for all
+                stages, too.
+            action: u_0, shape (B, m), or (m,) for all; free if absent.
 
         Returns:
             Shapes (B,), (B, m) and (B, N, m).
@@ -53,25 +54,29 @@ class Layer(torch.nn.Module):
         Raises:
             ValueError: a shape is another.
         """
-        of, count, device = self.nmpc.problem, len(states), states.device
-        names, given = tuple(data or ()), [states, theta]
-        shapes = [(count, of.states), (count, of.theta.size)]
+        of, names, states = self.nmpc.problem, tuple(data or ()), _tensor(states)
+        count = len(states) if states.ndim else 0
+        given = [_spread("states", states, (count, of.states), 0)]
+        given.append(_spread("theta", theta, (count, of.theta.size), 1))
         if action is not None:
-            given.append(action)
-            shapes.append((count, of.inputs))
-        for name in names:
-            given.append(torch.as_tensor((data or {})[name]))
-            shapes.append((count, of.horizon + 1, *of.data_names[name]))
-        called = ("states", "theta", "action")[: len(given) - len(names)] + names
-        for k, (tensor, shape) in enumerate(zip(given, shapes, strict=True)):
-            try:
-                given[k] = tensor.to("cpu", torch.float64).expand(shape)
-            except RuntimeError:
-                was = tuple(tensor.shape)
-                raise ValueError(f"{called[k]} has shape {was}; it must be {shape}") from None
+            given.append(_spread("action", action, (count, of.inputs), 1))
+        for name, one in (data or {}).items():
+            given.append(_spread(name, one, (count, of.horizon + 1, *of.data_names[name]), 2))
         value, plan = _Solve.apply(self, names, *given)  # type: ignore[no-untyped-call]
-        value, plan = value.to(device), plan.to(device)
+        value, plan = value.to(states.device), plan.to(states.device)
         return value, plan[:, 0], plan
+
+
+def _tensor(numbers: Any) -> Tensor:
+    return numbers if isinstance(numbers, Tensor) else torch.as_tensor(np.array(numbers, float))
+
+
+def _spread(name: str, numbers: Any, shape: tuple[int, ...], free: int) -> Tensor:
+    """Numbers in this shape, in double precision; so many axes in front may be left out."""
+    tensor = _tensor(numbers)
+    if tuple(tensor.shape) not in [shape[k:] for k in range(free + 1)]:
+        raise ValueError(f"{name} has shape {tuple(tensor.shape)}; it must be {shape}")
+    return tensor.to("cpu", torch.float64).expand(shape)
 
 
 class _Solve(torch.autograd.Function):
