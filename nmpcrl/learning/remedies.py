@@ -164,7 +164,7 @@ class Undoing:
     every: int = 1  # episodes
 
     def init(self, weights: Weights) -> Best:
-        return Best(weights, self.confirm(weights.theta), 0, self.rule.init(weights))
+        return Best(weights, self.confirm(weights.theta.copy()), 0, self.rule.init(weights))
 
     def step(
         self, theta: Vector, memory: Best, transition: Transition, *given: Any
@@ -182,7 +182,7 @@ class Undoing:
         memory = memory._replace(episodes=memory.episodes + 1)
         if memory.episodes % self.every:
             return theta, memory
-        cost = self.confirm(theta)
+        cost = self.confirm(theta.copy())
         if cost <= memory.cost:
             best = weights_after(memory.weights, theta, memory.inner)
             return theta, memory._replace(weights=best, cost=cost)

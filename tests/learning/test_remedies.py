@@ -128,6 +128,16 @@ def test_undo_goes_back_to_the_best_theta_and_w(controller, ends, weights):
     np.testing.assert_array_equal(judged_theta(fourth), fourth.theta)
 
 
+def test_a_rollout_that_writes_into_its_theta_moves_nothing(controller, ends, weights):
+    def judge(theta: np.ndarray) -> float:
+        theta[:] = 0.0
+        return 1.0
+
+    base = expected_sarsa(controller, 0.01)
+    path, found = in_turn(base, weights, ends), in_turn(undo(base, judge), weights, ends)
+    np.testing.assert_array_equal([one.theta for one in found], [one.theta for one in path])
+
+
 def test_undo_confirms_only_where_its_episodes_are_over(controller, transition, weights):
     judge = Mock(side_effect=[3.0, 2.0, 1.0])
     learner = undo(expected_sarsa(controller, 0.01), judge, every=2)
