@@ -42,7 +42,7 @@ def test_the_first_paragraph_counts_the_published_verdicts():
     count = Counter(claims().values())
     found = re.search(
         r"(\w+) claims were tested: (\w+) that the paper makes, and (\w+) that it takes for"
-        r" granted\. (\w+) is reproduced, (\w+) partly, (\w+) not\.",
+        r" granted\. (\w+) (?:is|are) reproduced, (\w+) partly, (\w+) not\.",
         README.replace("\n", " "),
     )
     outcomes = ("reproduced", "partly reproduced", "not reproduced")

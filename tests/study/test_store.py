@@ -14,6 +14,7 @@ from raising import raising
 
 from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import Fatrop
+from nmpcrl.control.variant import Variant
 from nmpcrl.study import (
     Experiment,
     Records,
@@ -137,14 +138,13 @@ def test_a_run_of_a_worker_with_other_code_or_another_solver_is_not_stored(
 
 def test_a_run_says_if_any_of_its_problems_needed_another_solver(monkeypatch):
     """Q(s, a) is another problem than V(s): one may compile and the other not."""
-    prepared = Nmpc._prepared
+    made = Nmpc._with
 
-    def not_with_a_fixed_action(nmpc, ocp):
-        if ocp.fixed_action.size:
-            nmpc._solves = Fatrop(nmpc.solver.tolerance)
-        return prepared(nmpc, ocp)
+    def not_with_a_fixed_action(nmpc, *, fix_action):
+        variant = made(nmpc, fix_action=fix_action)
+        return Variant(variant.ocp, Fatrop()) if fix_action else variant
 
-    monkeypatch.setattr(Nmpc, "_prepared", not_with_a_fixed_action)
+    monkeypatch.setattr(Nmpc, "_with", not_with_a_fixed_action)
     assert run(replace(QUICK, learner="QL")).facts["solver"] == "fatrop"
     assert run(QUICK).facts["solver"] == "riccati"
 
