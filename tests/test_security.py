@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "SECURITY.md").read_text()
 UNPICKLERS = {"cloudpickle", "dill", "joblib", "marshal", "pickle", "shelve"}
-UNPICKLING = ("investigation.py", "jobs.py", "trial.py")
+UNPICKLING = ("investigation.py", "jobs.py", "policy.py", "trial.py")
 CALLERS = {"distributed", "ftplib", "http", "httpx", "requests", "smtplib", "socket", "urllib"}
 
 
@@ -30,7 +30,7 @@ def imported(tree: ast.AST) -> set[str]:
     return names
 
 
-def test_nothing_is_unpickled_but_what_a_worker_answers_and_the_trial_it_is_given():
+def test_nothing_is_unpickled_but_answers_of_workers_trials_and_policies():
     for path, tree in trees().items():
         assert not imported(tree) & UNPICKLERS or path.name in UNPICKLING, path
         calls = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Call)]
@@ -45,5 +45,5 @@ def test_only_a_cluster_is_connected_to():
 
 def test_files_that_the_page_names_are_there():
     named = re.findall(r"`([\w/]+\.(?:py|md))`", TEXT)
-    assert len(named) == 4
+    assert len(named) == 5
     assert all((ROOT / name).is_file() for name in named)

@@ -113,7 +113,7 @@ def test_long_runs_begin_first(trained):
     short = Experiment("ES", episodes=1, steps=2)
     experiments = [
         short,
-        Experiment("frozen", episodes=1, steps=2, horizon=20),
+        Experiment("frozen", episodes=1, steps=2, horizon=15),
         Experiment("DES", episodes=1, steps=2),
         Experiment("RDES", episodes=2, steps=2),
     ]

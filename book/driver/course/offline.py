@@ -14,7 +14,7 @@ from driver.build import chapters, train
 from driver.course import editions
 from driver.project import ROOT
 
-LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fits a network
+LONG = 6  # of a run [s], as `limits.seconds_of` has it: those whose learner fits a network
 
 
 def stored(files: Iterable[str]) -> dict[str, Path]:
