@@ -52,7 +52,7 @@ PUSH = (1e-2, 1e-3, 1e-3, 1e-9, 1e-2)  # of its bounds' distance, by which an in
 PLANNED, SETTLED = 1, 2  # kinds of rows, else absent
 STRICT = 1e4  # W of hard rows, scaled: an exact penalty, so that no state is infeasible
 STRICT_TO_SOFT = 100.0  # so many times the largest other W it is at least
-DEAREST = 1e3  # W times its row's size in sizes of the costs, beyond which digits are lost
+DEAREST = 1e3  # W of rows of size 1 or more in sizes of the costs, beyond which digits are lost
 DEARER = 1e6  # times the size of the costs, by which a problem is divided at most for that
 ABSURD = 1e9  # no plan goes through such a state
 GROWS = 3.0  # times the first state's distance from a plan: inputs leave it by more
@@ -809,7 +809,8 @@ def scale(task, point, weights, sizes):
     model.size_rows(point.x[0], point.u[0], task.theta, task.data[0], sizes, 0, task.lines)
     for j in range(len(weights)):
         if weights[j] < np.inf:
-            factor = max(factor, min(weights[j] * sizes[j] / DEAREST, most))
+            price = weights[j] * min(1.0, sizes[j])
+            factor = max(factor, min(price / DEAREST, most))
     if not 0.0 < factor < np.inf:
         factor = 1.0
     strict = STRICT
