@@ -117,6 +117,8 @@ def learn(
             10 episodes are 20, to the last bit. A learner with a network must be the same object.
     """
     base = _learner(nmpc, learner, options)
+    if not isinstance(confirm, int) or confirm < 0:
+        raise ValueError(f"confirm = {confirm!r} must be a whole number, 0 or more")
     if resume is not None and theta is not None:
         raise ValueError("a resumed run begins with its own theta: leave theta= out")
     if resume is not None and isinstance(resume.weights.memory, Best) != undo:

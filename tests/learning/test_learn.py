@@ -201,6 +201,7 @@ def test_a_plant_is_told_the_time_since_the_start(nmpc):
         ("LSTD", {}, "learner = 'LSTD' is unknown: it must be a Learner, or one of LSTD-Q, QL"),
         ("LSTD-Q", {"episode": 3}, "unexpected keyword argument 'episode'"),
         ("LSTD-Q", {"episodes": 0}, "episodes = 0 must be a whole number, 1 or more"),
+        ("LSTD-Q", {"confirm": -1}, "confirm = -1 must be a whole number, 0 or more"),
         ("LSTD-Q", {"deviation": [0.1, 0.2]}, r"deviation = .* must hold 1 numbers, one an input"),
         ("LSTD-Q", {"deviation": -1.0}, "must be a finite number, 0 or more"),
     ],

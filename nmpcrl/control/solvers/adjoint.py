@@ -9,29 +9,17 @@ from numba import njit, types
 
 from .kernel import (
     PROBLEM,
-    RIGID,
-    SAME,
-    allocate,
-    begin_bounds,
-    begin_inputs,
-    condense,
     costate,
     factorise,
-    linearise,
-    measure,
     options,
     places,
-    recall,
-    roll,
     rows_along,
-    scale,
     scale_rows,
     sweep,
-    task_of,
     vector,
 )
 from .model import FIXED, NU, NX, PER
-from .slopes import FARTHEST, ROWS, independent, restore_rows
+from .slopes import FARTHEST, system
 
 SIGNATURE = types.boolean(*PROBLEM, vector, vector, vector)
 
@@ -44,26 +32,14 @@ def adjoint(
     """The step of z and lam, in the order of `Ocp`, for weights `of_plan` in the order of z.
 
     Slacks, and multipliers of x_0 = s and of a given u_0, have no step in `out`. Returns whether
-    it could be formed: as `slopes`.
+    it could be formed: see `slopes.system`.
     """
-    N = len(discount) - 1
-    task = task_of(theta, data, lower, upper, sides, kind, discount, weights, fixed)
-    point, plan, duals, old, stages, step = allocate(N, task.rows)
-    recall(task, SAME, solved, plan, old)
-    begin_inputs(task, point, state, action, SAME, plan.u)
-    roll(task, point)
-    factor = scale(task, point, weights, stages.firm)
-    begin_bounds(task, point, duals, old, RIGID, 1.0 / factor)
-    for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
-        for a in range(NX):
-            point.x[i, a] = plan.x[i, a]
-    measure(task, point, ROWS)
-    restore_rows(task, duals, old, factor)
-    linearise(task, point, duals, stages, stages.p)
-    condense(task, point, duals, stages, RIGID)
-    step.lam[:] = 0.0
-    if not independent(task, stages, step):
+    task, _, stages, step, factor, formed = system(
+        data, lower, upper, sides, kind, discount, weights, state, theta, action, fixed, solved
+    )
+    if not formed:
         return False
+    N = len(discount) - 1
     z_size, g_size, rows, _, _ = places(N + 1, task.lines, task.first)
     stages.off[:] = 0.0
     for i in range(N + 1):

@@ -21,6 +21,7 @@ from .kernel import (
     RIGID,
     SAME,
     allocate,
+    allocating,
     begin_bounds,
     begin_inputs,
     condense,
@@ -135,6 +136,33 @@ def gradient_along(task, point, stages, step, factor, w, out):
     model.initial_along(point.x[0], theta, task.data[0], w, out)
 
 
+@allocating
+def system(
+    data, lower, upper, sides, kind, discount, weights, state, theta, action, fixed, solved,
+):  # fmt: skip
+    """The KKT system at a solution, scaled by `factor` and condensed, and whether it can be solved.
+
+    It cannot where the solution is no strict minimum, or inputs cannot follow what is active.
+    """
+    N = len(discount) - 1
+    task = task_of(theta, data, lower, upper, sides, kind, discount, weights, fixed)
+    point, plan, duals, old, stages, step = allocate(N, task.rows)
+    recall(task, SAME, solved, plan, old)
+    begin_inputs(task, point, state, action, SAME, plan.u)
+    roll(task, point)
+    factor = scale(task, point, weights, stages.firm)
+    begin_bounds(task, point, duals, old, RIGID, 1.0 / factor)
+    for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
+        for a in range(NX):
+            point.x[i, a] = plan.x[i, a]
+    measure(task, point, ROWS)
+    restore_rows(task, duals, old, factor)
+    linearise(task, point, duals, stages, stages.p)
+    condense(task, point, duals, stages, RIGID)
+    step.lam[:] = 0.0
+    return task, point, stages, step, factor, independent(task, stages, step)
+
+
 SIGNATURE = types.boolean(*PROBLEM, vector, vector, vector, vector)
 
 
@@ -145,28 +173,15 @@ def slopes(
 ):  # fmt: skip
     """The Hessian times w, plus the gradient of the sum of u_0 with weights, shape (NTHETA,).
 
-    Returns whether it could be formed: not where the solution is no strict minimum, or inputs
-    cannot follow what is active. Where `out` has NU NX more places, they are du_0 / ds, the gain of
-    stage 0.
+    Returns whether it could be formed: see `system`. Where `out` has NU NX more places, they are
+    du_0 / ds, the gain of stage 0.
     """
-    N, mu = len(discount) - 1, RIGID
-    task = task_of(theta, data, lower, upper, sides, kind, discount, weights, fixed)
-    point, plan, duals, old, stages, step = allocate(N, task.rows)
-    recall(task, SAME, solved, plan, old)
-    begin_inputs(task, point, state, action, SAME, plan.u)
-    roll(task, point)
-    factor = scale(task, point, weights, stages.firm)
-    begin_bounds(task, point, duals, old, mu, 1.0 / factor)
-    for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
-        for a in range(NX):
-            point.x[i, a] = plan.x[i, a]
-    measure(task, point, ROWS)
-    restore_rows(task, duals, old, factor)
-    linearise(task, point, duals, stages, stages.p)
-    condense(task, point, duals, stages, mu)
-    step.lam[:] = 0.0
-    if not independent(task, stages, step):
+    task, point, stages, step, factor, formed = system(
+        data, lower, upper, sides, kind, discount, weights, state, theta, action, fixed, solved
+    )
+    if not formed:
         return False
+    N = len(discount) - 1
     right_hand_side(task, point, stages, w)
     for a in range(NU):
         stages.r[0, a] += of_action[a] / factor
