@@ -22,7 +22,6 @@ UNDERWAY = """() => {
   const { episode } = document.querySelector("[data-figure=runs]").shown.given;
   return episode >= 3 && episode < 300;
 }"""
-NETWORKS = ("DES", "RDES")  # of whose runs theta is published after evaluations only
 
 LOSES_C = """
   const real = Element.prototype.setAttribute
@@ -64,9 +63,7 @@ def assert_equal_to_published(shown: dict, known) -> None:
         cell = {name: given[name] for name in ("layout", "decay", "seed")}
         run = known.summaries[Experiment(one["learner"], **cell)]
         np.testing.assert_array_equal(one["run"]["training"], run.episodes["cost"])
-        held = one["learner"] in NETWORKS
-        assert one["after"] == (episode // 10 * 10 if held else episode)
-        at, rest = divmod(one["after"], 10)
+        at, rest = divmod(episode, 10)
         if rest:
             assert one["theta"] == run.episodes["theta"][episode - 1].tolist()
             assert one["judged"] == one["cost"]
@@ -119,8 +116,6 @@ def test_keys_move_episode_by_episode(tab, known):
     assert shown["given"]["episode"] == 297
     assert tab.handle(SLIDER).get_attribute("aria-valuetext") == "episode 297"
     assert_equal_to_published(shown, known)
-    told = tab.figure.locator("[role=status] p").all_inner_texts()
-    assert ["of episode 290" in line for line in told] == [False, True, False]
     tab.press(SLIDER, "Home")
     shown = tab.shown()
     es, des, frozen = (one["states"] for one in shown["found"])
@@ -167,9 +162,9 @@ def test_one_run_may_be_shown_alone_beside_the_frozen_arm(tab):
 
 
 def test_a_run_that_was_stopped_ends_where_it_was(tab, known):
-    e = Experiment("DES", layout="A", decay="step", seed=1)
+    e = Experiment("DES", layout="A", decay="step", seed=3)
     count = len(known.summaries[e].evaluations["cost"])
-    shown = choose(tab, Seed="1")
+    shown = choose(tab, Seed="3")
     assert shown["found"][1]["states"] == []
     said = "DES: this run was stopped before episode 300."
     assert said in tab.figure.locator("[role=status]").inner_text()

@@ -91,13 +91,11 @@
     };
   }
 
-  // What is drawn of a run: of networks, theta is known after an evaluation only, and stays until the next one.
+  // What is drawn of a run after an episode; its cost without noise is the published one where there is one.
   function drawn(run, learner, { episode, layout }, { looks, episodes }, loop) {
-    const evaluation = episodes.findLastIndex((one) => one <= episode);
-    const after = run.theta[episode].every(Number.isFinite) ? episode : episodes[evaluation];
-    const theta = run.theta[after], solved = loop(theta, layout);
-    const judged = after === episodes[evaluation] ? run.costs[evaluation] : solved.cost;
-    return { learner, look: looks[learner], run, theta, after, judged, training: run.training[episode - 1], ...solved };
+    const theta = run.theta[episode], solved = loop(theta, layout), evaluation = episodes.indexOf(episode);
+    const judged = evaluation < 0 ? solved.cost : run.costs[evaluation];
+    return { learner, look: looks[learner], run, theta, judged, training: run.training[episode - 1], ...solved };
   }
 
   async function build(figure, data, { rollout }) {

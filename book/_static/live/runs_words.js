@@ -31,19 +31,17 @@
       `There is no run of ${named(learner)} in layout ${layout} with noise that decays per ${decay} and seed ${seed}.`
     ),
     absent: "The runs of this layout could not be loaded.",
-    results: (found, episode) => found.map(({ learner, theta, training, judged, failed, states, after }) => {
+    results: (found, episode) => found.map(({ learner, theta, training, judged, failed, states }) => {
       const name = `${named(learner)}:`;
       if (!theta.every(Number.isFinite)) return [`${name} this run was stopped before episode ${episode}.`];
-      const held = after === episode ? "" : `, its controller of episode ${after}`;
-      const cost = failed ? [`; without noise${held}: no plan was found at step ${states.length}`]
-        : [`; without noise${held}`, fixed(judged, 1)];
+      const cost = failed ? [`; without noise: no plan was found at step ${states.length}`]
+        : ["; without noise", fixed(judged, 1)];
       if (!episode) return [`${name} before training`, "", ...cost];
       return [`${name} cost of episode ${episode}`, Number.isFinite(training) ? fixed(training, 1) : "cut short", ...cost];
     }),
     legend: (steps) => `Map: ${steps} steps without noise; dashed circles are the obstacles' safety distance. `
       + "Lines run over the episodes, and end where a run was stopped. The axis of the training cost ends at the "
       + "highest of the frozen arm, that of the cost without noise at 1.3 times the cost at the start; a line that "
-      + "leaves its axis goes on beyond it. Of DES and RDES, the parameters are published after every tenth episode, and "
-      + "their controller stays until the next.",
+      + "leaves its axis goes on beyond it.",
   };
 })();

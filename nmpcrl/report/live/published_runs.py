@@ -104,12 +104,12 @@ def _name(e: Experiment) -> str:
 
 
 def _numbers(summary: RunSummary, evaluated: list[int]) -> Column:
-    """One row; nan where a run was stopped before, and for a theta that is not known."""
+    """One row; nan where a run was stopped before."""
     found, training = summary.evaluations, summary.episodes["cost"]
     judged = np.full(len(evaluated), np.nan)
     judged[: len(found["cost"])] = found["cost"]
     theta = np.full((1 + len(training), len(paper.THETA_INIT)), np.nan)
-    theta[1:] = summary.episodes.get("theta", np.nan)
+    theta[1:] = summary.episodes["theta"]
     theta[found["episode"]] = found["theta"]
     return np.concatenate([training, judged, theta.T.ravel()])
 

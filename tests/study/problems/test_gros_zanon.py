@@ -16,7 +16,8 @@ CLEAR = 1e-4  # from a change of the active rows
 def strict(solution: Solution) -> bool:
     """Whether every row and bound is clearly active or clearly not: no kink is near."""
     m, ocp = solution.multipliers, solution.ocp
-    shares = m.obstacles / np.outer(ocp.gamma ** np.arange(len(ocp.states)), ocp.slack_weights)
+    prices = np.outer(PROBLEM.gamma ** np.arange(len(ocp.states)), ocp.slack_weights)
+    shares = m.obstacles / prices
     nearest = np.minimum(shares, 1 - shares)
     doubtful = (nearest > 1e-7) & (nearest < CLEAR)
     weak = (np.abs(m.inputs) > 1e-7) & (np.abs(m.inputs) < CLEAR)

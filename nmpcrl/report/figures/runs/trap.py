@@ -112,7 +112,7 @@ def cliffs(
         panel.set_ylabel("cost [thousands]")
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
-    title = rf"Beside the best $\theta$ there is no cliff: 2 % more $\theta_c$ adds {raised:.1%}"
+    title = rf"2 % more than the best $\theta_c$ adds {raised:.1%} of the cost"
     return headed(figure, f"{title} at most")
 
 
