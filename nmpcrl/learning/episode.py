@@ -64,7 +64,7 @@ class Episode:
     columns: dict[str, Matrix]  # `NUMBERS`, and state, action, features, theta and w after the step
     weights: Weights  # after it
     failure: str = ""  # what the solver said in the last step, or where the plant went
-    solver: str = ""  # another than the controller's if it took over, if only once
+    solver: str = ""  # another than the controller's where that cannot be compiled
 
     @property
     def steps(self) -> int:
@@ -101,8 +101,8 @@ def _episode(
         for step in trainer.steps(number, t, state, weights, warm):
             rows[t], t = _row(step), t + 1
             weights, failure = step.weights, step.failure
-            others = (one.solver for one in step.solves if one.solver != nmpc.solver.name)
-            solver = next(others, solver)
+            solves = [one for one in step.solves if not one.took_over]
+            solver = next((one.solver for one in solves if one.solver != nmpc.solver.name), solver)
             if loop or absurd(weights, nmpc.largest):
                 break
         if step.last or step.next_state is None:

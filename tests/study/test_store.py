@@ -14,7 +14,9 @@ from raising import raising
 
 from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import Fatrop
+from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.variant import Variant
+from nmpcrl.learning.episode import Loop
 from nmpcrl.study import (
     Experiment,
     Records,
@@ -246,3 +248,13 @@ def test_runs_are_read_by_experiment_and_selected_by_field():
     assert list(study.select(seed=6, learner="ES")) == [experiments[1]]
     assert len(study.select(seed=7)) == 0
     assert study.values_of("learner") == ("ES", "frozen")
+
+
+def test_a_run_in_which_fatrop_took_over_a_solve_is_stored(monkeypatch):
+    def taken_over(compiled, *given, **known):
+        return replace(compiled._fatrop.solve(*given, **known), took_over=True)
+
+    monkeypatch.setattr(Loop, "of", lambda trainer: None)
+    monkeypatch.setattr(Compiled, "solve", taken_over)
+    assert fetch(LEARNING).facts["solver"] == "riccati"
+    assert RUNS.is_stored(LEARNING)
