@@ -6,16 +6,11 @@ FITS := import ensurepip, sys, venv; sys.exit("%d.%d" % sys.version_info[:2] not
 FOUND = $(shell for each in $(PYTHON); do $$each -c '$(FITS)' 2>/dev/null && command -v $$each && break; done)
 BIN := .venv/bin
 
-# With LOCKED=1 only files with the hashes of locks/ are installed, and a .venv of other files is made anew.
-ifeq ($(LOCKED),1)
-LOCKS := $(PYTHONS:%=locks/python%.txt) $(or $(wildcard .venv/locked),anew)
-endif
-
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf article course release smoke chapter lab study bench test test-slow test-site test-weekly test-lab test-course check locks clean anew
+.PHONY: help book pdf course smoke chapter lab study bench test test-slow test-site test-weekly test-lab test-course check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -26,14 +21,8 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
 
-article: .venv/ready  ## The article, _build/html/nmpcrl-article.pdf; needs a built book
-	@$(BIN)/python book/article.py
-
 course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; SECRET=FILE draws other numbers
 	@$(BIN)/python book/course.py $(if $(SECRET),--secret "$(SECRET)")
-
-release: .venv-release/ready  ## What a release hands out, checked and with hashes, in _build/release
-	@.venv-release/bin/python release/make.py
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke
@@ -81,9 +70,6 @@ check: .venv/ready  ## Lint, format, types, and the structure of the notebooks w
 	@$(BIN)/mypy
 	@$(BIN)/python -m pytest -m "not slow" tests/book/test_notebooks.py tests/test_architecture.py
 
-locks: .venv/ready  ## Make locks/ anew from environment.txt; any target takes them with LOCKED=1
-	@$(BIN)/python locks/make.py $(PYTHONS)
-
 clean:  ## Remove the built book; stored runs stay
 	rm -rf _build
 
@@ -91,25 +77,16 @@ clean:  ## Remove the built book; stored runs stay
 QUICKLY := -qq --disable-pip-version-check --no-compile
 byte_code = $(1)/bin/python -m compileall -qq -j 0 $(1)/lib >/dev/null 2>&1 || true
 
-.venv/ready: environment.txt pyproject.toml $(LOCKS)
+.venv/ready: environment.txt pyproject.toml
 	@test -n "$(FOUND)" || { \
 	  echo "Python $(firstword $(PYTHONS)) to $(lastword $(PYTHONS)), with venv and ensurepip, is needed, and not found" \
 	    "among $(PYTHON): install it, or say where: make PYTHON=/path/to/python3"; exit 1; }
-	@test -z "$(LOCKS)" -o "$$(uname -sm)" = "Linux x86_64" || { \
-	  echo "The locks are for Linux on x86-64, and this is $$(uname -sm): leave out LOCKED=1"; exit 1; }
 	@echo "Taking $$($(FOUND) --version), $(FOUND), and installing the pinned packages of" \
-	  "$(if $(LOCKS),locks,environment.txt) into .venv: some minutes, once."
+	  "environment.txt into .venv: some minutes, once."
 	@$(FOUND) -m venv --clear .venv
-	@$(BIN)/pip install $(QUICKLY) $(if $(LOCKS),--require-hashes -r locks/python$$( \
-	  $(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])').txt,-r environment.txt)
+	@$(BIN)/pip install $(QUICKLY) -r environment.txt
 	@$(call byte_code,.venv)
 	@$(BIN)/pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
-	@touch $(if $(LOCKS),.venv/locked) $@
-
-# The tools that check and describe a release are no part of the book's environment.
-.venv-release/ready: release/tools.txt .venv/ready
-	@$(BIN)/python -m venv --clear .venv-release
-	@.venv-release/bin/pip install -qq --disable-pip-version-check --require-hashes -r $<
 	@touch $@
 
 # The kernel of JupyterLab is the Python of .venv.

@@ -1,10 +1,9 @@
-"""One list of pinned packages, the locks made of it, and the Pythons that all places agree on."""
+"""One list of pinned packages, and what all places agree on: the Pythons and the version."""
 
 import re
 import tomllib
 from pathlib import Path
 
-import pytest
 import yaml
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -14,8 +13,6 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 REQUIRES = SpecifierSet(PROJECT["project"]["requires-python"])
 PYTHONS = [python for python in (f"3.{minor}" for minor in range(50)) if python in REQUIRES]
-LINUX = {"sys_platform": "linux", "platform_system": "Linux", "platform_machine": "x86_64"}
-CUDA = re.compile(r"(cuda|nvidia)-.*|triton")  # what torch brings along on Linux, and no list names
 
 
 def pins() -> list[Requirement]:
@@ -29,40 +26,12 @@ def versions(requirements: list[Requirement]) -> dict[str, str]:
     }
 
 
-def locked(python: str) -> dict[str, list[str]]:
-    """The entries of a lock: `name==version`, and the hashes of each."""
-    text = (ROOT / f"locks/python{python}.txt").read_text().replace("\\\n", "")
-    entries = [line.split() for line in text.splitlines() if not line.startswith("#")]
-    return {name: hashes for name, *hashes in entries}
-
-
 def test_every_package_is_pinned_once_to_one_version():
     for one in pins():
         assert re.fullmatch(r"==[\w.]+", str(one.specifier)), one
         assert not one.url, one
     names = [canonicalize_name(one.name) for one in pins()]
     assert len(names) == len(set(names))
-
-
-@pytest.mark.parametrize("python", PYTHONS)
-def test_a_lock_names_the_versions_of_the_list_and_what_torch_brings(python):
-    here = LINUX | {"python_version": python}
-    wanted = versions([one for one in pins() if not one.marker or one.marker.evaluate(here)])
-    found = versions([Requirement(name) for name in locked(python)])
-    brought = {name for name in found if CUDA.fullmatch(name)}
-    assert {name: found[name] for name in found if name not in brought} == wanted
-    assert not brought & set(wanted)
-
-
-@pytest.mark.parametrize("python", PYTHONS)
-def test_every_package_of_a_lock_has_hashes_and_nothing_but_hashes(python):
-    for name, hashes in locked(python).items():
-        assert hashes, name
-        assert all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", one) for one in hashes), name
-
-
-def test_there_is_a_lock_for_each_python_and_no_other():
-    assert {path.stem for path in (ROOT / "locks").glob("*.txt")} == {f"python{p}" for p in PYTHONS}
 
 
 def test_what_the_package_imports_is_pinned():
@@ -79,3 +48,9 @@ def test_all_places_name_the_same_pythons():
     assert makefile[1].split() == PYTHONS
     assert workflow["jobs"]["pythons"]["strategy"]["matrix"]["python"] == PYTHONS
     assert PROJECT["tool"]["mypy"]["python_version"] == PYTHONS[0]
+
+
+def test_the_citation_has_the_version_and_the_licence_of_the_package():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    for name in ("version", "license"):
+        assert citation[name] == PROJECT["project"][name]

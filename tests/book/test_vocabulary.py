@@ -11,7 +11,7 @@ from driver.page import enrich
 
 ROOT = Path(__file__).resolve().parents[2]
 FIXED = {ROOT / "nmpcrl" / "studies" / "population.py"}  # its registered questions stay
-NAMED = ("README.md", "CONTRIBUTING.md", "CITATION.cff", "metadata.yaml")
+NAMED = ("README.md", "CONTRIBUTING.md", "CITATION.cff")
 
 OLD = {  # the word that replaces it: the pattern of the old one, and where it may stand
     "robustness analysis": (r"atlas(es)?", ""),

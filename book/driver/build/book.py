@@ -19,8 +19,7 @@ Each build has its own place, in the last column, and six steps, each a function
               unsolved, as `questions` says, the scripts of live figures, as `live` says, and
               minutes and plans, as `teaching` says
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
-              repaired for all readers, as `accessible` says, and with what a shared link to
-              them shows, as `card` says
+              repaired for all readers, as `accessible` says
 
 PLACE/html is removed first and put there last: it exists only if everything went well. What was
 executed before something went wrong is not executed again, as long as nothing it rests on changed.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import nbformat
 
-from driver.page import accessible, card, enrich, pictures
+from driver.page import accessible, enrich, pictures
 from driver.project import ROOT, Failure, from_yaml, pages, shown
 from nmpcrl.course import exercises
 
@@ -47,7 +47,6 @@ def render(place: Path, strict: bool) -> None:
         notebook = pictures.plain(enrich.download(exercises.reopened(nbformat.read(path, 4))))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
     accessible.site(work / "_build/html")
-    card.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")
     title = from_yaml("_config.yml")["title"]
     for old, new in {"index": f"{pages()[0]}.html", **MOVED}.items():
