@@ -37,7 +37,6 @@ study: .venv/ready  ## Train the whole study, or what is missing of it: hours, a
 	@$(BIN)/python -m nmpcrl study
 
 bench: .venv/ready  ## Measure how long solves, steps and runs take, and print what is reached
-	@if [ -d _build/html ]; then $(BIN)/python -m nmpcrl bench --live > /dev/null; fi
 	@$(BIN)/python -m nmpcrl bench
 
 # On all cores, up to four. A target that names files does so to read no others: tests/conftest.py

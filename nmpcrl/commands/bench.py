@@ -11,7 +11,6 @@ PROBLEMS = 100_000  # of a sweep
 @click.option("--smoke", "length", flag_value="smoke", help="Only check that it works.")
 @click.option("--again", is_flag=True, help="Measure even if a benchmark is stored.")
 @click.option("--publish", is_flag=True, help="Only time the learners, and publish C3 and C4.")
-@click.option("--live", is_flag=True, help="Only measure the live figures of the built book.")
 @click.option(
     "--sweep",
     metavar="[N]",
@@ -21,18 +20,14 @@ PROBLEMS = 100_000  # of a sweep
     help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count the outcomes.",
 )
 @click.option("--sizes", is_flag=True, help="Only time problems of many sizes, and beside mpcrl.")
-def bench(
-    length: str, again: bool, publish: bool, live: bool, sweep: int | None, sizes: bool
-) -> None:
+def bench(length: str, again: bool, publish: bool, sweep: int | None, sizes: bool) -> None:
     """Measure how long solves, steps and runs take.
 
-    The times are compared with targets, and stored with the runs. What --live measured
-    last is printed as well.
+    The times are compared with targets, and stored with the runs.
 
     \b
     Example:
       nmpcrl bench --short
-      nmpcrl bench --live
       nmpcrl bench --sweep 1000
     """
     if sweep is not None:
@@ -49,9 +44,7 @@ def bench(
     elif publish:
         _publish_timing()
     else:
-        if not live:
-            _print_times(length, again=again)
-        _print_live(again=live)
+        _print_times(length, again=again)
 
 
 def _print_times(length: str, *, again: bool) -> None:
@@ -64,15 +57,6 @@ def _print_times(length: str, *, again: bool) -> None:
         f"{suite.path()}: {about['length']}, {about['date']}, {about['seconds']:.0f} s;"
         f" other programs used up to {about['others']:.0%} of the cores"
     )
-
-
-def _print_live(*, again: bool) -> None:
-    from nmpcrl.bench import live, targets
-    from nmpcrl.bench.live_targets import live_targets
-
-    if found := live.measure() if again else live.stored():
-        click.echo(targets.shown(live_targets(found)))
-        click.echo(f"{live.path()}: {found.get('date', 'of an unknown date')}")
 
 
 def _publish_timing() -> None:

@@ -8,7 +8,7 @@ import pytest
 from raising import raising
 
 from nmpcrl.analysis import summaries
-from nmpcrl.bench import live, problem_times, suite, sweep
+from nmpcrl.bench import problem_times, suite, sweep
 from nmpcrl.claims import publish, published, reproduce
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, fetch, jobs
@@ -26,7 +26,7 @@ LONG = (  # replaced by a refusal
     *((summaries, "fetch_summaries"), (cluster, "executor"), (jobs, "processes")),
     *((publish, "publish_timing"), (reproduce, "relock")),
     *((problem_times, "make"), (suite, "measure")),
-    *((suite, "read_or_measure"), (sweep, "sweep"), (live, "measure")),
+    *((suite, "read_or_measure"), (sweep, "sweep")),
 )
 
 

@@ -8,7 +8,6 @@ import pytest
 from raising import raising
 
 from nmpcrl.analysis.trajectory import closes_at
-from nmpcrl.bench import live as bench
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
@@ -122,11 +121,3 @@ def test_all_its_files_are_there_once(shown):
 def test_without_a_compiler_there_is_a_sentence(monkeypatch):
     monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
     assert "There is no live figure here" in live.laboratory().data
-
-
-def test_what_the_benchmark_reads_is_there(data):
-    read = set(re.findall(r"data\.(\w+)", bench.TRAIN))
-    assert read <= set(data)
-    taken = re.search(r"const data = .*, \{ (.*?) \} = data", bench.TRAIN)[1]
-    assert set(taken.split(", ")) <= set(data)
-    assert Experiment().layout in data["layouts"]
