@@ -1,9 +1,8 @@
 """What one should ask the authors, and which of our verdicts the answers would decide."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report.text import departure_link, listed
 
 
@@ -63,21 +62,6 @@ def asked(decides: Mapping[str, Collection[str]]) -> str:
         f"{number}. {question.ask} (It bears on {listed(claims)}.)"
         for number, (question, claims) in enumerate(_bearing(decides), start=1)
     )
-
-
-def by_claim(verdicts: Iterable[Verdict], decides: Mapping[str, Collection[str]]) -> str:
-    """One item a claim, in Markdown: what became of it, and which answers would change what."""
-    lines = []
-    for one in verdicts:
-        numbers = [n for n, (_, claims) in enumerate(_bearing(decides), 1) if one.claim in claims]
-        several = "s" * (len(numbers) > 1)
-        answers = f"The answer{several} to {listed(numbers)} may change it: we would judge it anew."
-        lines.append(
-            f"- **{one.claim}.** {one.statement} *Here: {one.words}.*"
-            f" {answers if numbers else 'No verdict on it changed with any reading that we tried.'}"
-            f" What else we would expect to matter: {one.would_change}"
-        )
-    return "\n".join(lines)
 
 
 def _bearing(decides: Mapping[str, Collection[str]]) -> list[tuple[Question, list[str]]]:

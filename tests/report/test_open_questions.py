@@ -4,8 +4,7 @@ import re
 
 import pytest
 
-from nmpcrl.claims.verdict import NOT, Verdict
-from nmpcrl.report.open_questions import QUESTIONS, asked, by_claim, question_list
+from nmpcrl.report.open_questions import QUESTIONS, asked, question_list
 from nmpcrl.study.departures import DEPARTURES
 
 
@@ -42,16 +41,8 @@ def test_each_says_what_its_departures_decide_together(decides, varied, said):
     assert said in item("H", question_list(decides, varied))
 
 
-def test_a_letter_asks_only_what_a_verdict_depends_on_and_says_which():
+def test_departures_ask_only_what_a_verdict_depends_on_and_says_which():
     lines = asked({"C": ("C2", "C1"), "L": ("C5",)}).splitlines()
     assert lines[0].startswith(f"1. {QUESTIONS[1].ask} (It bears on ")
     assert lines[1].endswith("(It bears on C5.)")
     assert len(lines) == 2
-
-
-def test_a_letter_says_of_each_claim_which_answers_may_change_it():
-    verdicts = [Verdict(name, "It does.", NOT, "Longer runs.") for name in ("C1", "C3")]
-    first, second = by_claim(verdicts, {"B": ("C1",), "C": ("C1",), "L": ("C5",)}).splitlines()
-    assert first.startswith("- **C1.** It does. *Here: not reproduced.* The answers to 1 and 2 may")
-    assert "No verdict on it changed" in second
-    assert second.endswith("What else we would expect to matter: Longer runs.")

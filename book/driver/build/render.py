@@ -13,7 +13,10 @@ from driver.page import accessible, enrich, pictures
 from driver.project import ROOT, Failure, from_yaml, pages, shown
 from nmpcrl.course import exercises
 
-MOVED = {"book/cluster": "reproduce.html#reproduce-cluster"}  # addresses of pages that are no more
+MOVED = {  # addresses of pages that are no more
+    "book/cluster": "reproduce.html#reproduce-cluster",
+    "book/letter": "departures.html#departures-questions",
+}
 ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{title}</title>
