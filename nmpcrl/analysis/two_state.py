@@ -25,7 +25,7 @@ class Chain:
     """The chain, and how often each of its states is updated."""
 
     gamma: float = 0.97
-    share: float = 1.0  # of updates made in the first state; on-policy visits give 1/2
+    share: float = 1.0  #: of updates made in the first state; on-policy visits give 1/2
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

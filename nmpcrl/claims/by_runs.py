@@ -27,17 +27,17 @@ class RunClaim(Claim):
 
     number: Number | None = None
     values: Callable[[pd.DataFrame, Paths], Values] | None = None
-    among: tuple[str, ...] = ()  # the learners whose cells are covered; by default `learners`
-    threshold: float  # where yes ends
-    besides: Number | None = None  # counts that must be 0; the weaker question omits them
+    among: tuple[str, ...] = ()  #: the learners whose cells are covered; by default `learners`
+    threshold: float  #: where yes ends
+    besides: Number | None = None  #: counts that must be 0; the weaker question omits them
     numbers: Callable[[pd.DataFrame, Paths, tuple[str, ...]], Mapping[str, Any]] | None = None
-    unit: str = "pairs"  # of answers, in the plural
-    nothing: float = 0.0  # the number of a run without the effect
-    short: str = ""  # the statement in the head of a column
-    label: str = ""  # of the axis with the numbers
-    linear_to: float = 0.0  # the axis is linear up to this size, and logarithmic above
-    borders: Vector = field(default_factory=lambda: np.empty(0))  # others, for `at_borders`
-    holds: ClassVar[Callable[..., Any]] = operator.le  # of a number and a border: is it yes?
+    unit: str = "pairs"  #: of answers, in the plural
+    nothing: float = 0.0  #: the number of a run without the effect
+    short: str = ""  #: the statement in the head of a column
+    label: str = ""  #: of the axis with the numbers
+    linear_to: float = 0.0  #: the axis is linear up to this size, and logarithmic above
+    borders: Vector = field(default_factory=lambda: np.empty(0))  #: others, for `at_borders`
+    holds: ClassVar[Callable[..., Any]] = operator.le  #: of a number and a border, is it yes?
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """The answers to these numbers at a border: True, False or missing."""
@@ -111,8 +111,8 @@ class AtLeast(RunClaim):
 class Contrast(RunClaim):
     """Is the first number of each pair above the border, and the second not?"""
 
-    wrong: str  # of a run above the border: "diverged"
-    worst: str  # of a run whose number is infinite
+    wrong: str  #: of a run above the border, "diverged"
+    worst: str  #: of a run whose number is infinite
 
     def judge(self, observed: Observations) -> Verdict:
         """See `RunClaim.judge`; each half of the claim is counted, too."""

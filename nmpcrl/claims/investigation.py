@@ -60,16 +60,16 @@ class Part:
     which may raise a `Refusal` while it is incomplete.
     """
 
-    run: Callable[[Any, str, int, int], Row]  # (setting, place, episodes, seed)
+    run: Callable[[Any, str, int, int], Row]  #: (setting, place, episodes, seed)
     arms: Arms | Callable[[pd.DataFrame], Arms]
     places: Sequence[str]
     episodes: int
     seeds: int = 1
-    begin: int = 0  # k of the first seed
-    at: Callable[[], Sequence[tuple[str, int]]] | None = None  # place and k of rows, if no grid
-    deterministic: Collection[str] = ()  # arms that draw nothing: one seed
-    first: Mapping[str, int] = field(default_factory=dict)  # arms of the first places only
-    seconds: float = 0.03  # of processor time an episode, as long as no row of the arm is known
+    begin: int = 0  #: k of the first seed
+    at: Callable[[], Sequence[tuple[str, int]]] | None = None  #: place and k of rows, if no grid
+    deterministic: Collection[str] = ()  #: arms that draw nothing, one seed
+    first: Mapping[str, int] = field(default_factory=dict)  #: arms of the first places only
+    seconds: float = 0.03  #: of processor time an episode, as long as no row of the arm is known
 
     def settings(self, table: pd.DataFrame) -> Arms:
         """The setting of each arm, given the rows of earlier parts."""
@@ -89,11 +89,11 @@ class Answer:
     """The answer to a question."""
 
     outcome: Outcome
-    counts: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # yes, asked; by unit
+    counts: Mapping[str, tuple[int, int]] = field(default_factory=dict)  #: yes, asked; by unit
     numbers: Mapping[str, float] = field(default_factory=dict)
-    beside: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # decide nothing
-    said: str = ""  # the outcome in words, where `WORDS` would mislead
-    question: str = ""  # its name
+    beside: Mapping[str, tuple[int, int]] = field(default_factory=dict)  #: decide nothing
+    said: str = ""  #: the outcome in words, where `WORDS` would mislead
+    question: str = ""  #: its name
 
     @property
     def words(self) -> str:
@@ -106,10 +106,10 @@ class Question:
     """A question, with the answer that was expected before any row was made."""
 
     name: str
-    question: str  # in words
+    question: str  #: in words
     expected: Outcome
-    answer: Callable[[Any], Answer]  # of the table, or of `Investigation.evidence`
-    pilot: str = ""  # the sentence of an earlier, smaller experiment
+    answer: Callable[[Any], Answer]  #: of the table, or of `Investigation.evidence`
+    pilot: str = ""  #: the sentence of an earlier, smaller experiment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,17 +119,17 @@ class Investigation:
     name: str
     parts: Mapping[str, Part]
     questions: Sequence[Question]
-    seed: Callable[[str, int], int]  # of a place and k
-    registered: str = ""  # the commit that fixed parts and questions, before the first row
-    epoch: int = 1  # raised by hand where an edit changes a number
-    epochs: Mapping[str, int] = field(default_factory=lambda: EPOCHS)  # of the packages it rests on
-    libraries: Sequence[str] = ()  # whose versions matter, beside those of every run
-    digits: int | None = None  # to which published numbers are rounded
-    arrays: Sequence[str] = ()  # columns of lists, published in NAME.npz for the rows with one
-    evidence: Callable[[pd.DataFrame], Any] = lambda table: table  # that questions are asked of
-    prepare: Callable[[Iterable[tuple[Condition, Any]]], None] | None = None  # compiles ahead
-    where: Path | None = None  # of the published table; by default the project's folder
-    source: str = ""  # what of a reader's file rows depend on, as `lock.code` reads it
+    seed: Callable[[str, int], int]  #: of a place and k
+    registered: str = ""  #: the commit that fixed parts and questions, before the first row
+    epoch: int = 1  #: raised by hand where an edit changes a number
+    epochs: Mapping[str, int] = field(default_factory=lambda: EPOCHS)  #: of packages it rests on
+    libraries: Sequence[str] = ()  #: whose versions matter, beside those of every run
+    digits: int | None = None  #: to which published numbers are rounded
+    arrays: Sequence[str] = ()  #: columns of lists, published in NAME.npz for the rows with one
+    evidence: Callable[[pd.DataFrame], Any] = lambda table: table  #: that questions are asked of
+    prepare: Callable[[Iterable[tuple[Condition, Any]]], None] | None = None  #: compiles ahead
+    where: Path | None = None  #: of the published table; by default the project's folder
+    source: str = ""  #: what of a reader's file rows depend on, as `lock.code` reads it
 
     @property
     def asked(self) -> dict[str, Question]:

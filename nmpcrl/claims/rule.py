@@ -51,27 +51,27 @@ Paths: TypeAlias = Mapping[Experiment, Column]  # the states of each run's last 
 class Observations:
     """The data that claims are judged by; each claim takes a part."""
 
-    runs: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `rows.table`
+    runs: pd.DataFrame = field(default_factory=pd.DataFrame)  #: of `rows.table`
     paths: Paths = field(default_factory=dict)
-    timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
-    assumptions: tuple[Assumption, ...] = ()  # of `audit`
+    timings: pd.DataFrame = field(default_factory=pd.DataFrame)  #: of `time_learners`
+    assumptions: tuple[Assumption, ...] = ()  #: of `audit`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Claim(ABC):
     """A statement of the paper, or of this book, and how it is decided."""
 
-    name: str  # "C1"
+    name: str  #: "C1"
     statement: str
     question: str
-    measured: str  # the numbers that answer the question, in words
-    border: str  # where yes ends, in words
+    measured: str  #: the numbers that answer the question, in words
+    border: str  #: where yes ends, in words
     test: str = "share of yes, with its interval"
-    would_change: str  # where another verdict is expected
-    learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
-    quotation: str = ""  # the paper's sentences behind it, in Markdown
-    implied: bool = False  # whether the paper takes it for granted, and nowhere says it
-    words: Mapping[Outcome, str] = field(default_factory=dict)  # for outcomes with words of its own
+    would_change: str  #: where another verdict is expected
+    learners: tuple[str, ...] = ()  #: whose runs answer, in the order of the question
+    quotation: str = ""  #: the paper's sentences behind it, in Markdown
+    implied: bool = False  #: whether the paper takes it for granted, and nowhere says it
+    words: Mapping[Outcome, str] = field(default_factory=dict)  #: for outcomes with own words
 
     @abstractmethod
     def judge(self, observed: Observations) -> Verdict:

@@ -29,23 +29,23 @@ def differ(first: Outcome, second: Outcome) -> bool:
 class Assumption:
     """One assumption of the theorems behind C8, beside the algorithm that is run."""
 
-    theorem: str  # the assumption
-    here: str  # the paper's algorithm, with a measurement where one is possible
+    theorem: str  #: the assumption
+    here: str  #: the paper's algorithm, with a measurement where one is possible
     holds: bool
-    by: tuple[str, ...] = ()  # the theorems that make it, by their names in `assumptions.THEOREMS`
+    by: tuple[str, ...] = ()  #: the theorems that make it, by their names in `assumptions.THEOREMS`
 
 
 @dataclass(frozen=True)
 class Halves:
     """How many runs of two learners went wrong, in one reading of the decay."""
 
-    learners: tuple[str, str]  # by the claim the first goes wrong, and the second does not
-    wrong: str  # how: "diverged"
+    learners: tuple[str, str]  #: by the claim the first goes wrong, and the second does not
+    wrong: str  #: how, "diverged"
     decay: str
-    pairs: int  # with two known answers
-    counts: tuple[int, int]  # runs of the first and of the second that went wrong
-    against: int  # pairs in which only the second went wrong
-    apart: int  # pairs in which only one of them did
+    pairs: int  #: with two known answers
+    counts: tuple[int, int]  #: runs of the first and of the second that went wrong
+    against: int  #: pairs in which only the second went wrong
+    apart: int  #: pairs in which only one of them did
 
     @property
     def as_claimed(self) -> int:
@@ -62,24 +62,24 @@ class Halves:
 class Verdict:
     """The verdict on one claim."""
 
-    claim: str  # "C1"
+    claim: str  #: "C1"
     statement: str
     outcome: Outcome
-    would_change: str = ""  # where another verdict is expected
-    share: float | None = None  # of yes; None for a claim that asks no runs
-    interval: tuple[float, float] | None = None  # of the share, whatever the missing say; or ratio
+    would_change: str = ""  #: where another verdict is expected
+    share: float | None = None  #: of yes; None for a claim that asks no runs
+    interval: tuple[float, float] | None = None  #: of the share, whatever the missing say; or ratio
     by_layout: dict[str, Outcome] = field(default_factory=dict)
     by_decay: dict[str, Outcome] = field(default_factory=dict)
-    counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes, answers: "all", "A"
-    by_learner: dict[str, tuple[int, int]] = field(default_factory=dict)  # of the weaker question
-    missing: int = 0  # answers
-    unit: str = "pairs"  # of answers
-    levels: dict[str, int] = field(default_factory=dict)  # how many layouts, seeds and so on
-    ratio: float | None = None  # of times, for a claim about time
-    halves: tuple[Halves, ...] = ()  # of a claim that joins two statements
-    numbers: Mapping[str, Any] = field(default_factory=dict)  # further ones, by name
-    assumptions: tuple[Assumption, ...] = ()  # of a claim that rests on a theorem
-    said: str = ""  # the outcome in the claim's own words, if it has any
+    counts: dict[str, tuple[int, int]] = field(default_factory=dict)  #: yes, answers, "all", "A"
+    by_learner: dict[str, tuple[int, int]] = field(default_factory=dict)  #: of the weaker question
+    missing: int = 0  #: answers
+    unit: str = "pairs"  #: of answers
+    levels: dict[str, int] = field(default_factory=dict)  #: how many layouts, seeds and so on
+    ratio: float | None = None  #: of times, for a claim about time
+    halves: tuple[Halves, ...] = ()  #: of a claim that joins two statements
+    numbers: Mapping[str, Any] = field(default_factory=dict)  #: further ones, by name
+    assumptions: tuple[Assumption, ...] = ()  #: of a claim that rests on a theorem
+    said: str = ""  #: the outcome in the claim's own words, if it has any
 
     @property
     def words(self) -> str:

@@ -24,10 +24,10 @@ OPTIONS: dict[str, Any] = {"print_time": False, "ipopt": Ipopt().options}
 class Plan(NamedTuple):
     """What is found."""
 
-    value: float  # V_theta(s)
-    features: Vector  # its gradient in theta
+    value: float  #: V_theta(s)
+    features: Vector  #: its gradient in theta
     iterations: int
-    variables: tuple[Matrix, ...]  # states (n, N + 1), inputs (m, N) and slacks (M, N + 1)
+    variables: tuple[Matrix, ...]  #: states (n, N + 1), inputs (m, N) and slacks (M, N + 1)
 
 
 Solve = Callable[[Vector, Vector, Plan | None], Plan]

@@ -34,18 +34,18 @@ class Batch:
     All results are nan there.
     """
 
-    state: Matrix  # s, shape (B, n)
-    theta: Matrix  # shape (B, d)
-    value: Vector  # V or Q, shape (B,)
-    features: Matrix  # the values' gradients in theta, shape (B, d)
-    status: NDArray[np.str_]  # shape (B,)
-    iterations: Vector  # of the solver, shape (B,)
-    violation: Vector  # of hard rows and of a hard box, shape (B,)
-    restarts: Vector  # shape (B,)
-    solver: NDArray[np.object_]  # names, shape (B,)
-    seconds: float  # wall time of all [s]
-    point: Matrix  # z, lam and nu of each, in the order of `ocp`
-    data: NDArray[np.float64]  # d_0, ..., d_N: shape (B, N + 1, size), or (1, N + 1, size)
+    state: Matrix  #: s, shape (B, n)
+    theta: Matrix  #: shape (B, d)
+    value: Vector  #: V or Q, shape (B,)
+    features: Matrix  #: the values' gradients in theta, shape (B, d)
+    status: NDArray[np.str_]  #: shape (B,)
+    iterations: Vector  #: of the solver, shape (B,)
+    violation: Vector  #: of hard rows and of a hard box, shape (B,)
+    restarts: Vector  #: shape (B,)
+    solver: NDArray[np.object_]  #: names, shape (B,)
+    seconds: float  #: wall time of all [s]
+    point: Matrix  #: z, lam and nu of each, in the order of `ocp`
+    data: NDArray[np.float64]  #: d_0, ..., d_N, shape (B, N + 1, size), or (1, N + 1, size)
     ocp: Ocp
 
     @cached_property

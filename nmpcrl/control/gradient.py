@@ -21,10 +21,10 @@ from nmpcrl.control.sensitivity import Sensitivity
 class Gradient:
     """The derivatives of a number in what a solve was given."""
 
-    state: Vector  # in s, shape (n,)
-    theta: Vector  # shape (d,)
-    action: Vector  # in the u_0 that was given, shape (m,), or (0,) where it was free
-    data: dict[str, NDArray[np.float64]]  # by name, each of N + 1 stages: shape (N + 1, ...)
+    state: Vector  #: in s, shape (n,)
+    theta: Vector  #: shape (d,)
+    action: Vector  #: in the u_0 that was given, shape (m,), or (0,) where it was free
+    data: dict[str, NDArray[np.float64]]  #: by name, each of N + 1 stages, shape (N + 1, ...)
 
 
 class Backward(Sensitivity):

@@ -33,22 +33,22 @@ class Ocp:
 
     problem: Problem
     ties_active: bool  # whether a start on a row's boundary counts as beyond it  # departure L
-    variables: ca.SX  # z
-    parameters: ca.SX  # p
-    theta: ca.SX  # the part of p that is learned
-    objective: ca.SX  # Eq. (2a)
-    constraints: ca.SX  # g
+    variables: ca.SX  #: z
+    parameters: ca.SX  #: p
+    theta: ca.SX  #: the part of p that is learned
+    objective: ca.SX  #: Eq. (2a)
+    constraints: ca.SX  #: g
     equality: NDArray[np.bool_]
     lower: Vector
     upper: Vector
-    states: Indices  # x_i in z, shape (N + 1, n)
-    inputs: Indices  # u_i in z, shape (N, m)
-    slacks: Indices  # sigma_i in z, shape (N + 1, M)
-    initial: Indices  # Eq. (2b) in g, shape (n,)
-    fixed_action: Indices  # u_0 = a in g, shape (m,), or (0,) when u_0 is free
-    dynamics: Indices  # Eq. (2c) in g, shape (N, n)
-    obstacles: Indices  # Eq. (2f) in g, shape (N + 1, M)
-    hard: Indices  # hard rows in g, shape (N + 1, H)
+    states: Indices  #: x_i in z, shape (N + 1, n)
+    inputs: Indices  #: u_i in z, shape (N, m)
+    slacks: Indices  #: sigma_i in z, shape (N + 1, M)
+    initial: Indices  #: Eq. (2b) in g, shape (n,)
+    fixed_action: Indices  #: u_0 = a in g, shape (m,), or (0,) when u_0 is free
+    dynamics: Indices  #: Eq. (2c) in g, shape (N, n)
+    obstacles: Indices  #: Eq. (2f) in g, shape (N + 1, M)
+    hard: Indices  #: hard rows in g, shape (N + 1, H)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the problem, to be transcribed again."""

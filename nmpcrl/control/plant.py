@@ -43,13 +43,13 @@ class Plant(Described):
     Where a task has obstacles, the first two states are its position.
     """
 
-    dynamics: Dynamics  # d state / dt as a CasADi expression of (state, action)
-    state_names: tuple[str, ...]  # with units, as an axis shows them: ("x [m]", ...)
-    action_names: tuple[str, ...]  # with units
-    lower: Vector  # smallest action, shape (m,)
-    upper: Vector  # largest action, shape (m,)
-    period: float = 0.2  # [s]
-    substeps: int = 1  # Runge-Kutta steps a period: more where the dynamics are faster than it
+    dynamics: Dynamics  #: d state / dt as a CasADi expression of (state, action)
+    state_names: tuple[str, ...]  #: with units, as an axis shows them, ("x [m]", ...)
+    action_names: tuple[str, ...]  #: with units
+    lower: Vector  #: smallest action, shape (m,)
+    upper: Vector  #: largest action, shape (m,)
+    period: float = 0.2  #: [s]
+    substeps: int = 1  #: Runge-Kutta steps a period, more where the dynamics are faster than it
 
     def __post_init__(self) -> None:
         lower, upper = box("plant.", self.lower, self.upper, self.m, "an input")

@@ -35,8 +35,8 @@ class Parameter:
     A weight of a cost, which must not turn negative, is Parameter(start, lower=0).
     """
 
-    start: Any  # a number or an array
-    lower: Any = -np.inf  # a number, or one for each
+    start: Any  #: a number or an array
+    lower: Any = -np.inf  #: a number, or one for each
     upper: Any = np.inf
 
 
@@ -44,10 +44,10 @@ class Parameter:
 class Soft:
     """Rows h <= sigma, sigma >= 0, with a discounted cost of `weight` for a unit of each slack."""
 
-    row: Callable[..., Any]  # (x, u, th) -> h, a number or a column; with d where there are data
-    weight: Any = 1.0  # W > 0, a number, or one a row
-    stages: Any = None  # among 0, ..., N: an index, a slice or a list; all possible ones if None
-    each: str | None = None  # a table in data: every line of it has these rows, and is d[each]
+    row: Callable[..., Any]  #: (x, u, th) -> h, a number or a column; with d where there are data
+    weight: Any = 1.0  #: W > 0, a number, or one a row
+    stages: Any = None  #: among 0, ..., N, an index, a slice or a list; all possible ones if None
+    each: str | None = None  #: a table in data, every line of it has these rows, and is d[each]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,8 @@ class Hard:
 
     each: ClassVar[str | None] = None
 
-    row: Callable[..., Any]  # as in `Soft`
-    stages: Any = None  # as in `Soft`
+    row: Callable[..., Any]  #: as in `Soft`
+    stages: Any = None  #: as in `Soft`
 
 
 Rows = dict[str, Soft | Hard]  # by name in messages
@@ -67,7 +67,7 @@ Rows = dict[str, Soft | Hard]  # by name in messages
 class Series:
     """Data that differ between stages, the default where `Nmpc.solve` is given none."""
 
-    values: Any  # an array with a first axis of N + 1
+    values: Any  #: an array with a first axis of N + 1
 
 
 class Expressions(NamedTuple):
@@ -76,14 +76,14 @@ class Expressions(NamedTuple):
     x: ca.SX
     u: ca.SX
     theta: ca.SX
-    d: ca.SX  # of one stage
-    line: ca.SX  # of the table of `Soft.each`
+    d: ca.SX  #: of one stage
+    line: ca.SX  #: of the table of `Soft.each`
     next_x: ca.SX
     stage: ca.SX
     terminal: ca.SX
     initial: ca.SX
-    fixed: ca.SX  # h and then g, without the rows of lines
-    each: ca.SX  # the rows of one line
+    fixed: ca.SX  #: h and then g, without the rows of lines
+    each: ca.SX  #: the rows of one line
 
 
 class Problem(Described):

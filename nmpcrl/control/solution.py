@@ -31,21 +31,21 @@ class Status(StrEnum):
     """How an optimum was found."""
 
     SOLVED = "solved"
-    RESTARTED = "restarted"  # not from the start that was asked for
-    TAKEN_OVER = "taken over"  # by `Solution.solver`, where the one asked for found no optimum
+    RESTARTED = "restarted"  #: not from the start that was asked for
+    TAKEN_OVER = "taken over"  #: by `Solution.solver`, where the one asked for found no optimum
 
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
     """The multipliers of Eq. (2), with CasADi's signs."""
 
-    initial: Vector  # of (2b), shape (n,)
-    dynamics: Matrix  # of (2c), shape (N, n)
-    states: Matrix  # of the box (2d), shape (N + 1, n); negative at a lower bound
-    inputs: Matrix  # of the input bounds (2e), shape (N, m); negative at a lower bound
-    obstacles: Matrix  # of (2f), shape (N + 1, M); between 0 and omega gamma^i
-    slacks: Matrix  # of sigma >= 0, shape (N + 1, M); never positive
-    action: Vector  # of u_0 = a, shape (m,); shape (0,) when u_0 is free
+    initial: Vector  #: of (2b), shape (n,)
+    dynamics: Matrix  #: of (2c), shape (N, n)
+    states: Matrix  #: of the box (2d), shape (N + 1, n); negative at a lower bound
+    inputs: Matrix  #: of the input bounds (2e), shape (N, m); negative at a lower bound
+    obstacles: Matrix  #: of (2f), shape (N + 1, M); between 0 and omega gamma^i
+    slacks: Matrix  #: of sigma >= 0, shape (N + 1, M); never positive
+    action: Vector  #: of u_0 = a, shape (m,); shape (0,) when u_0 is free
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,19 +59,19 @@ class Solution:
     theta itself. The price of a `soft_box` is part of `value`, and `features` is its gradient.
     """
 
-    state: Vector  # s, shape (n,)
-    theta: Vector  # shape (2n + m + 1,)
-    value: float  # V_theta(s), or Q_theta(s, a) when u_0 was fixed; without a hard box's charge
-    features: Vector  # phi, the value's gradient in theta, shape (2n + m + 1,)
-    iterations: int  # of the solver
-    seconds: float  # wall time of the solve and the gradient [s]
-    point: Vector  # z, lam and nu, one after the other, each in the order of `ocp`
-    ocp: Ocp  # says where each part lies
-    solver: str  # the name of the solver that found it
-    data: Matrix  # d_0, ..., d_N, shape (N + 1, size)
-    restarts: int = 0  # how often the solver had to begin again
-    violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
-    took_over: bool = False  # whether another solver found it than the one that was asked
+    state: Vector  #: s, shape (n,)
+    theta: Vector  #: shape (2n + m + 1,)
+    value: float  #: V_theta(s), or Q_theta(s, a) when u_0 was fixed; without a hard box's charge
+    features: Vector  #: phi, the value's gradient in theta, shape (2n + m + 1,)
+    iterations: int  #: of the solver
+    seconds: float  #: wall time of the solve and the gradient [s]
+    point: Vector  #: z, lam and nu, one after the other, each in the order of `ocp`
+    ocp: Ocp  #: says where each part lies
+    solver: str  #: the name of the solver that found it
+    data: Matrix  #: d_0, ..., d_N, shape (N + 1, size)
+    restarts: int = 0  #: how often the solver had to begin again
+    violation: float = 0.0  #: how far the plan leaves the box, in the unit of the state
+    took_over: bool = False  #: whether another solver found it than the one that was asked
 
     @property
     def status(self) -> Status:

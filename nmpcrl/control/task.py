@@ -21,10 +21,10 @@ NO_DATA = np.zeros(0)
 class Theta(NamedTuple):
     """The blocks of theta, in the paper's order: (stage, inputs, terminal, constraint)."""
 
-    x: Any  # vartheta_x, square roots of the state weights, shape (n,)
-    u: Any  # vartheta_u, square roots of the input weights, shape (m,)
-    f: Any  # vartheta_f, square roots of the terminal weights, shape (n,)
-    c: Any  # theta_c, tightens the obstacle constraint, shape (1,)
+    x: Any  #: vartheta_x, square roots of the state weights, shape (n,)
+    u: Any  #: vartheta_u, square roots of the input weights, shape (m,)
+    f: Any  #: vartheta_f, square roots of the terminal weights, shape (n,)
+    c: Any  #: theta_c, tightens the obstacle constraint, shape (1,)
 
     @classmethod
     def split(cls, theta: Any, n: int, m: int) -> "Theta":
@@ -48,9 +48,9 @@ def terminal_cost(state: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
 class Obstacle:
     """A disc that the robot keeps away from: Eq. (19)."""
 
-    x: float  # centre [m]
-    y: float  # centre [m]
-    diameter: float = 2.0  # d_obs [m]
+    x: float  #: centre [m]
+    y: float  #: centre [m]
+    diameter: float = 2.0  #: d_obs [m]
 
     def __post_init__(self) -> None:
         if not np.isfinite([self.x, self.y]).all():
@@ -67,18 +67,18 @@ class Task(Described):
     headings less than half a turn apart; a `Problem` can weigh 2 (1 - cos(e)) in place of e^2.
     """
 
-    start: Vector  # s_0, shape (n,)
-    target: Vector  # s_ref, shape (n,); the reference input is 0
-    lower: Vector  # box on the state, shape (n,); -inf where free
-    upper: Vector  # shape (n,)
+    start: Vector  #: s_0, shape (n,)
+    target: Vector  #: s_ref, shape (n,); the reference input is 0
+    lower: Vector  #: box on the state, shape (n,); -inf where free
+    upper: Vector  #: shape (n,)
     obstacles: tuple[Obstacle, ...] = ()
-    weights: Vector = field(default_factory=lambda: np.array([1.0, 1.0, 0.1]))  # diagonal of Q
-    robot_diameter: float = 0.5  # d_rob [m]
-    near: float = 1.5  # d_t: closer than this the input is charged instead of the obstacles
+    weights: Vector = field(default_factory=lambda: np.array([1.0, 1.0, 0.1]))  #: diagonal of Q
+    robot_diameter: float = 0.5  #: d_rob [m]
+    near: float = 1.5  #: d_t, closer than this the input is charged instead of the obstacles
     margin: float = 0.35  # d_o: the penalty begins this much before Xi = 0  # departure N
-    penalty: float = 50.0  # c of Upsilon
+    penalty: float = 50.0  #: c of Upsilon
     soft_box: bool = False  # leaving the box is priced as obstacles are  # departure M
-    target_may_lie_outside: bool = False  # only to show what the paper's printed box does
+    target_may_lie_outside: bool = False  #: only to show what the paper's printed box does
 
     def __post_init__(self) -> None:
         shape = np.shape(self.start)

@@ -21,8 +21,8 @@ Statistics = tuple[Any, ...]  # arrays
 class Batch(NamedTuple):
     """The memory of a `batched` rule."""
 
-    steps: int = 0  # since theta was moved
-    sums: Statistics = ()  # of their statistics; empty before the first
+    steps: int = 0  #: since theta was moved
+    sums: Statistics = ()  #: of their statistics; empty before the first
 
 
 def batched(

@@ -23,26 +23,26 @@ ROUNDS = 4  # of the grids after the first; the last has a spacing of 1/112 of t
 class Transition:
     """One step of the plant, and the NMPC's solution that led to it."""
 
-    state: Vector  # s, shape (n,)
+    state: Vector  #: s, shape (n,)
     action: Vector  # a, the action applied, noise included, shape (m,)  # departure Q
-    cost: float  # l(s, a)
-    next_state: Vector  # s+, shape (n,)
+    cost: float  #: l(s, a)
+    next_state: Vector  #: s+, shape (n,)
     solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
-    end: bool = False  # whether s+ ends the episode, and is worth 0
-    last: bool = False  # whether the episode is over: by `end`, or since its time is
-    next_data: Mapping[str, Any] | None = None  # what a `Problem` knows of the stages from s+ on
-    first: bool = False  # whether it is the first of its episode
+    end: bool = False  #: whether s+ ends the episode, and is worth 0
+    last: bool = False  #: whether the episode is over, by `end`, or since its time is
+    next_data: Mapping[str, Any] | None = None  #: what a `Problem` knows of the stages from s+ on
+    first: bool = False  #: whether it is the first of its episode
 
 
 @dataclass(frozen=True, eq=False)
 class NextValue:
     """The value that a bootstrap gives to the next state."""
 
-    value: float  # Q(s+, a+)
-    features: Vector | None = None  # phi+, shape (d,); None from a network
-    solution: Solution | None = None  # of the second solve, a warm start for the next first one
-    loss: float = np.nan  # of the network's last fit in this step
-    seconds: float = 0.0  # spent on fit and prediction [s]; a solve keeps its own time
+    value: float  #: Q(s+, a+)
+    features: Vector | None = None  #: phi+, shape (d,); None from a network
+    solution: Solution | None = None  #: of the second solve, a warm start for the next first one
+    loss: float = np.nan  #: of the network's last fit in this step
+    seconds: float = 0.0  #: spent on fit and prediction [s]; a solve keeps its own time
 
 
 class Controller(Protocol):
@@ -95,8 +95,8 @@ class Imitation:
     fit of the network that predicts: `network`, or `target` where there is one.
     """
 
-    network: "QNetwork"  # learns in place
-    with_theta: bool  # whether theta is an input
+    network: "QNetwork"  #: learns in place
+    with_theta: bool  #: whether theta is an input
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
     fits: int = 1  # mini-batches a step  # departure H
     target: "Target | None" = None  # predicts in the network's place  # departure I

@@ -61,10 +61,10 @@ class Episode:
     """The steps of an episode, one row each."""
 
     number: int
-    columns: dict[str, Matrix]  # `NUMBERS`, and state, action, features, theta and w after the step
-    weights: Weights  # after it
-    failure: str = ""  # what the solver said in the last step, or where the plant went
-    solver: str = ""  # another than the controller's where that cannot be compiled
+    columns: dict[str, Matrix]  #: `NUMBERS`, state, action, features, theta and w after the step
+    weights: Weights  #: after it
+    failure: str = ""  #: what the solver said in the last step, or where the plant went
+    solver: str = ""  #: another than the controller's where that cannot be compiled
 
     @property
     def steps(self) -> int:

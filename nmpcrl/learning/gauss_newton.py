@@ -24,9 +24,9 @@ from nmpcrl.learning.policy_gradient import no_successor
 class Sensitivities(NamedTuple):
     """The memory of `ClosedLoop`, of an episode."""
 
-    states: Matrix  # ds / dtheta, shape (n, d)
-    gradient: Vector  # of J, so far, shape (d,)
-    curvature: Matrix  # shape (d, d)
+    states: Matrix  #: ds / dtheta, shape (n, d)
+    gradient: Vector  #: of J, so far, shape (d,)
+    curvature: Matrix  #: shape (d, d)
 
 
 @dataclass(frozen=True, eq=False)

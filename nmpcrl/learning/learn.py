@@ -46,16 +46,16 @@ class Learned:
     """What `learn` reached; it can be pickled, and given to `learn` to go on from."""
 
     nmpc: Nmpc
-    weights: Weights  # after the last episode that left them usable
+    weights: Weights  #: after the last episode that left them usable
     # arrays over all steps: "episode", cost, value, delta and so on as in `Episode.columns`, and
     # "theta" after the step, shape (steps, d)
     history: dict[str, Any]
-    costs: Vector  # of the rollouts without noise: before learning, and then as asked for
-    diverged: str  # why learning could not go on; "" if it could
-    warnings: tuple[str, ...]  # of this call
-    episodes: int  # in all
+    costs: Vector  #: of the rollouts without noise, before learning, and then as asked for
+    diverged: str  #: why learning could not go on; "" if it could
+    warnings: tuple[str, ...]  #: of this call
+    episodes: int  #: in all
     seed: int
-    rng: np.random.Generator  # of plant and start, after the last episode
+    rng: np.random.Generator  #: of plant and start, after the last episode
 
     @property
     def vector(self) -> Vector:

@@ -50,9 +50,9 @@ Move = Callable[..., tuple[Vector, Any]]  # the step of an `UpdateRule`
 class Weights:
     """theta, and the memory of the update rule: `Weights(theta)` begins a run."""
 
-    theta: Vector  # of the NMPC, shape (d,)
-    w: Vector = None  # type: ignore[assignment]  # of gradient TD, shape (d,); 0 if absent
-    memory: Any = None  # of the rule; None before its first step
+    theta: Vector  #: of the NMPC, shape (d,)
+    w: Vector = None  # type: ignore[assignment]  #: of gradient TD, shape (d,); 0 if absent
+    memory: Any = None  #: of the rule; None before its first step
 
     def __post_init__(self) -> None:
         if self.w is None:
@@ -81,7 +81,7 @@ class UpdateRule:
 
     # (theta, memory, transition, TD error, next value) -> the next theta and memory
     step: Callable[[Vector, Any, Transition, float, NextValue], tuple[Vector, Any]]
-    init: Callable[[Weights], Any] = no_memory  # before the first step
+    init: Callable[[Weights], Any] = no_memory  #: before the first step
     # (theta, memory) -> the same, after an episode that a failed solve ended, perhaps at once
     interrupted: Callable[[Vector, Any], tuple[Vector, Any]] = unchanged
 
@@ -101,7 +101,7 @@ class SemiGradient:
 class Auxiliary(NamedTuple):
     """The memory of gradient TD."""
 
-    w: Vector  # shape (d,)
+    w: Vector  #: shape (d,)
 
 
 def first_w(weights: Weights) -> Auxiliary:
@@ -113,11 +113,11 @@ def first_w(weights: Weights) -> Auxiliary:
 class GradientTD:
     """The step of Eq. (16), of theta and w, both from the old ones."""
 
-    alpha: float  # step size of theta
-    beta: float  # of w
+    alpha: float  #: step size of theta
+    beta: float  #: of w
     gamma: float
-    curved: Controller | None = None  # knows the Hessian, for the term that Eq. (16) drops
-    follow: Callable[[Vector, float, Vector, float], Vector] = auxiliary_step  # moves w
+    curved: Controller | None = None  #: knows the Hessian, for the term that Eq. (16) drops
+    follow: Callable[[Vector, float, Vector, float], Vector] = auxiliary_step  #: moves w
 
     def __call__(
         self, theta: Vector, memory: Auxiliary, transition: Transition, delta: float,
@@ -151,9 +151,9 @@ def gradient_td(alpha: float, beta: float, gamma: float, **options: Any) -> Upda
 class Update:
     """What one step of learning did."""
 
-    weights: Weights  # after the step
-    successor: NextValue | None = None  # None where the bootstrap gave no value
-    delta: float | None = None  # TD error; None likewise, and the weights are unchanged
+    weights: Weights  #: after the step
+    successor: NextValue | None = None  #: None where the bootstrap gave no value
+    delta: float | None = None  #: TD error; None likewise, and the weights are unchanged
 
 
 def theta_bounds(nmpc: Any) -> Bounds | None:
@@ -168,12 +168,12 @@ def theta_bounds(nmpc: Any) -> Bounds | None:
 class Learner:
     """A bootstrap and an update rule; a step is pure but for their network or generator."""
 
-    name: str  # as tables show it
-    bootstrap: Bootstrap  # values the next state
-    rule: UpdateRule  # moves theta
-    gamma: float  # discount factor of the TD error
-    bounds: Bounds | None = None  # into which theta is projected after each step
-    values_actions: bool = False  # whether it is meant for Q(s, a), and not for V(s)
+    name: str  #: as tables show it
+    bootstrap: Bootstrap  #: values the next state
+    rule: UpdateRule  #: moves theta
+    gamma: float  #: discount factor of the TD error
+    bounds: Bounds | None = None  #: into which theta is projected after each step
+    values_actions: bool = False  #: whether it is meant for Q(s, a), and not for V(s)
 
     def __post_init__(self) -> None:
         if not isinstance(self.rule, UpdateRule):

@@ -78,7 +78,7 @@ def machine_code() -> ModuleType:
 class Predictor:
     """Weights that predict a value."""
 
-    net: tuple[Any, ...]  # the arrays of `dense`
+    net: tuple[Any, ...]  #: the arrays of `dense`
 
     @property
     def weights(self) -> NDArray[np.float32]:

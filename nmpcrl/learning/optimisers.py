@@ -36,7 +36,7 @@ class GaussNewton:
     """
 
     alpha: float = 1.0
-    regularisation: float = 1e-3  # in the unit of the curvature
+    regularisation: float = 1e-3  #: in the unit of the curvature
     bounds: Bounds | None = None
 
     def __call__(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
@@ -60,7 +60,7 @@ class TrustRegion:
     """
 
     radius: float
-    scale: Vector  # a typical change of each component of theta, shape (d,)
+    scale: Vector  #: a typical change of each component of theta, shape (d,)
 
     def __call__(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
         if not np.isfinite(curvature).all():

@@ -27,12 +27,12 @@ def monomials(state: Vector) -> Vector:
 class CriticMeans(NamedTuple):
     """Means over a batch, of which v and w are made."""
 
-    value_matrix: Matrix  # phi (phi - gamma phi+)'
-    value_vector: Vector  # phi l
-    advantage_matrix: Matrix  # psi psi'
-    advantage_vector: Vector  # psi l
-    coupling: Matrix  # psi (gamma phi+ - phi)'
-    fisher: Matrix  # (dpi / dtheta)' dpi / dtheta
+    value_matrix: Matrix  #: phi (phi - gamma phi+)'
+    value_vector: Vector  #: phi l
+    advantage_matrix: Matrix  #: psi psi'
+    advantage_vector: Vector  #: psi l
+    coupling: Matrix  #: psi (gamma phi+ - phi)'
+    fisher: Matrix  #: (dpi / dtheta)' dpi / dtheta
 
 
 def ridge(A: Matrix, b: Vector, regularisation: float) -> Vector:

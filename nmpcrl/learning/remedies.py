@@ -107,8 +107,8 @@ def _of_each_step(learner: Learner, who: str) -> UpdateRule:
 class Mean(NamedTuple):
     """The memory of an `averaged` rule."""
 
-    theta: Vector  # the mean
-    steps: int  # in all
+    theta: Vector  #: the mean
+    steps: int  #: in all
     inner: Any
 
 
@@ -117,7 +117,7 @@ class Averaging:
     """The functions of a rule that remembers mean <- mean + (theta - mean) / n after some steps."""
 
     rule: UpdateRule
-    skip: int  # steps until n = 1; before, the mean is theta
+    skip: int  #: steps until n = 1; before, the mean is theta
 
     def init(self, weights: Weights) -> Mean:
         return Mean(weights.theta, 0, self.rule.init(weights))
@@ -144,7 +144,7 @@ def averaged(learner: Learner, skip: int = 0) -> Learner:
 class Best(NamedTuple):
     """The memory of `Undoing`."""
 
-    weights: Weights  # theta with the lowest cost, and its w
+    weights: Weights  #: theta with the lowest cost, and its w
     cost: float
     episodes: int
     inner: Any
@@ -160,8 +160,8 @@ class Undoing:
     """
 
     rule: UpdateRule
-    confirm: Callable[[Vector], float]  # theta -> cost without noise; each call is interaction
-    every: int = 1  # episodes
+    confirm: Callable[[Vector], float]  #: theta -> cost without noise; each call is interaction
+    every: int = 1  #: episodes
 
     def init(self, weights: Weights) -> Best:
         return Best(weights, self.confirm(weights.theta.copy()), 0, self.rule.init(weights))

@@ -23,10 +23,10 @@ from nmpcrl.learning.environment import (
 class Rollout:
     """The closed loop from the start without noise."""
 
-    states: Matrix  # s_0, ..., s_K; fewer where it ended or failed, shape (<= K + 1, n)
-    actions: Matrix  # shape (<= K + 1, m)
-    costs: Vector  # RL stage costs, shape (<= K + 1,)
-    failure: str = ""  # what the solver said, if it failed, or where the plant went
+    states: Matrix  #: s_0, ..., s_K; fewer where it ended or failed, shape (<= K + 1, n)
+    actions: Matrix  #: shape (<= K + 1, m)
+    costs: Vector  #: RL stage costs, shape (<= K + 1,)
+    failure: str = ""  #: what the solver said, if it failed, or where the plant went
 
     @property
     def cost(self) -> float:

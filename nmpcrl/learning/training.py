@@ -40,18 +40,18 @@ class Step:
     """One step of learning; `update` is None where it failed, and `solution` may be."""
 
     episode: int
-    time: int  # t of Algorithm 1
-    state: Vector  # s, shape (n,)
-    weights: Weights  # after the step
-    action: Vector  # a, noise included, shape (m,); nan where no action was found
-    cost: float = np.nan  # l(s, a); nan where no action was found
-    plan: Solution | None = None  # whose first input is the policy of Eq. (4)
-    solution: Solution | None = None  # whose value is learned; the plan, unless that is Q(s, a)
+    time: int  #: t of Algorithm 1
+    state: Vector  #: s, shape (n,)
+    weights: Weights  #: after the step
+    action: Vector  #: a, noise included, shape (m,); nan where no action was found
+    cost: float = np.nan  #: l(s, a); nan where no action was found
+    plan: Solution | None = None  #: whose first input is the policy of Eq. (4)
+    solution: Solution | None = None  #: whose value is learned; the plan, unless that is Q(s, a)
     update: Update | None = None
-    failure: str = ""  # what the solver said, if it failed, or where the plant went
-    end: bool = False  # whether the plant ended the episode
-    last: bool = False  # whether it is the last step of its episode, for whatever reason
-    next_state: Vector | None = None  # s+; None where it failed
+    failure: str = ""  #: what the solver said, if it failed, or where the plant went
+    end: bool = False  #: whether the plant ended the episode
+    last: bool = False  #: whether it is the last step of its episode, for whatever reason
+    next_state: Vector | None = None  #: s+; None where it failed
 
     @property
     def solves(self) -> list[Solution]:
@@ -85,8 +85,8 @@ class Exploration:
     `Exploration(episodes=40, steps=60, deviation=0.1)` draws normal noise that does not decay.
     """
 
-    noise: Matrix  # epsilon, shape (episodes, steps, m)
-    scale: NDArray[np.floating]  # c_epsilon^k, shape (episodes, steps); 1 if absent
+    noise: Matrix  #: epsilon, shape (episodes, steps, m)
+    scale: NDArray[np.floating]  #: c_epsilon^k, shape (episodes, steps); 1 if absent
 
     def __init__(
         self, noise: Any = None, scale: Any = None, *, episodes: int = 1, steps: int = 100,

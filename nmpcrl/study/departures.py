@@ -13,10 +13,10 @@ from pathlib import Path
 class Departure:
     """One gap of the paper and its reading."""
 
-    gap: str  # in the paper
-    reading: str  # of this library
-    why: str  # evidence or reason
-    variant: str = ""  # fields of `Experiment` for the other reading, if there are any
+    gap: str  #: in the paper
+    reading: str  #: of this library
+    why: str  #: evidence or reason
+    variant: str = ""  #: fields of `Experiment` for the other reading, if there are any
 
 
 FILE = Path(__file__).with_suffix(".toml")

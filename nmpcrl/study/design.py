@@ -107,8 +107,8 @@ IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
 class Variant:
     """One field with another value; the others are those of the main table."""
 
-    departure: str  # its letter in `DEPARTURES`; "" where the main table follows the paper
-    changed: str  # the difference in words
+    departure: str  #: its letter in `DEPARTURES`; "" where the main table follows the paper
+    changed: str  #: the difference in words
     fields: Mapping[str, Any]
     learners: tuple[str, ...] = PAPER
 

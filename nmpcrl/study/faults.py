@@ -17,12 +17,12 @@ BASE = 0.5  # [m] between the wheels: the robot's diameter
 class Fault:
     """A difference between plant and model; without one the plant has the robot's bits."""
 
-    grip: float = 1.0  # share of the speed that arrives
-    lag: float = 0.0  # [s], time constant of both inputs, whose state is not measured
-    bias: float = 0.0  # [rad/s], added to the turn rate
-    drift: tuple[float, float] = (0.0, 0.0)  # [m/s]
-    slip: float = 0.0  # each wheel loses a share drawn from U(0, slip) for an episode
-    noise: tuple[float, float, float] = (0.0, 0.0, 0.0)  # deviations of the measured state
+    grip: float = 1.0  #: share of the speed that arrives
+    lag: float = 0.0  #: [s], time constant of both inputs, whose state is not measured
+    bias: float = 0.0  #: [rad/s], added to the turn rate
+    drift: tuple[float, float] = (0.0, 0.0)  #: [m/s]
+    slip: float = 0.0  #: each wheel loses a share drawn from U(0, slip) for an episode
+    noise: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: deviations of the measured state
 
     def __post_init__(self) -> None:
         if not (0 <= self.grip <= 1 and 0 <= self.slip <= 1):

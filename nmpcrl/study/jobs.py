@@ -39,7 +39,7 @@ class Failure(NamedTuple):
     """A job that failed, and why."""
 
     item: Any
-    error: str  # type and message
+    error: str  #: type and message
     traceback: str = ""
 
 

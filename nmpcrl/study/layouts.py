@@ -31,10 +31,10 @@ ARRIVED = 0.5  # distance to the target, over all states, at which a rollout has
 class Screening:
     """The criteria that a layout meets."""
 
-    blocked: bool  # 1: the straight line
-    clear: bool  # 2: start and target
-    arrives: bool  # 3: the rollout of theta_init
-    closing: bool  # a gap of this rollout is closed at theta_c = d_o
+    blocked: bool  #: 1, the straight line
+    clear: bool  #: 2, start and target
+    arrives: bool  #: 3, the rollout of theta_init
+    closing: bool  #: a gap of this rollout is closed at theta_c = d_o
 
     @property
     def passed(self) -> bool:

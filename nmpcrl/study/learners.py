@@ -23,7 +23,7 @@ class Generators(NamedTuple):
 
     noise: np.random.Generator
     network: np.random.Generator
-    directions: np.random.Generator  # of the control with random directions
+    directions: np.random.Generator  #: of the control with random directions
 
 
 Factory = Callable[[Settings, Nmpc, Generators], Learner]
@@ -32,12 +32,12 @@ Factory = Callable[[Settings, Nmpc, Generators], Learner]
 class Network(NamedTuple):
     """A reading of what the paper leaves open of the network.  # departures H and I"""
 
-    options: Mapping[str, Any] = MappingProxyType({})  # of `QNetwork`
-    fits: int = 1  # mini-batches a step
-    normalised: bool = False  # whether inputs and target are scaled
-    target: Callable[[Settings], Mapping[str, Any]] | None = None  # options of `Target`
-    late: bool = False  # whether the value is predicted before the step's fit
-    greedy: bool = False  # whether the next action is the network's minimiser, and not u_1
+    options: Mapping[str, Any] = MappingProxyType({})  #: of `QNetwork`
+    fits: int = 1  #: mini-batches a step
+    normalised: bool = False  #: whether inputs and target are scaled
+    target: Callable[[Settings], Mapping[str, Any]] | None = None  #: options of `Target`
+    late: bool = False  #: whether the value is predicted before the step's fit
+    greedy: bool = False  #: whether the next action is the network's minimiser, and not u_1
 
 
 NETWORKS = {
@@ -77,11 +77,11 @@ class Entry:
     """A learner that experiments can name."""
 
     make: Factory
-    reads: tuple[str, ...] = VALUING  # fields that only some learners read
-    network: bool = False  # whether a network learns: torch is part of the keys then
-    solves: int = 2  # a step, without the one for Q(s, a)
-    valued: bool = False  # whether Q(s, a) is always learned, with u_0 = a fixed
-    curved: bool = False  # whether the Hessian of the value is used
+    reads: tuple[str, ...] = VALUING  #: fields that only some learners read
+    network: bool = False  #: whether a network learns, torch is part of the keys then
+    solves: int = 2  #: a step, without the one for Q(s, a)
+    valued: bool = False  #: whether Q(s, a) is always learned, with u_0 = a fixed
+    curved: bool = False  #: whether the Hessian of the value is used
 
 
 def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:

@@ -39,8 +39,8 @@ Predictor = Callable[[Sequence[Motion], int], Vector]  # (motions, t) -> shape (
 class Straight:
     """Motion at constant velocity; standing still at velocity 0."""
 
-    centre: Point  # at the start [m]
-    velocity: Point = (0.0, 0.0)  # [m/s]
+    centre: Point  #: at the start [m]
+    velocity: Point = (0.0, 0.0)  #: [m/s]
 
     def __call__(self, seconds: Vector) -> Vector:
         return np.asarray(self.centre, float) + np.multiply.outer(seconds, self.velocity)
@@ -50,10 +50,10 @@ class Straight:
 class Sinusoidal:
     """Oscillation: centre + reach sin(2 pi t / period + phase)."""
 
-    centre: Point  # of the motion [m]
-    reach: Point  # from the centre to a turning point [m]
-    period: float  # [s]
-    phase: float = 0.0  # at the start [rad]
+    centre: Point  #: of the motion [m]
+    reach: Point  #: from the centre to a turning point [m]
+    period: float  #: [s]
+    phase: float = 0.0  #: at the start [rad]
 
     def __call__(self, seconds: Vector) -> Vector:
         swing = np.sin(2 * np.pi * np.asarray(seconds) / self.period + self.phase)
@@ -67,11 +67,11 @@ class Polynomial:
     centre + along s + across p(s), |s| <= 1, where s runs at constant speed and turns at the ends.
     """
 
-    centre: Point  # [m]
-    along: Point  # half of the axis [m]; p is across it, in units of its length
-    coefficients: tuple[float, ...]  # of p, the constant first
-    speed: float  # on the axis [m/s]
-    phase: float = 0.0  # s at the start, on the way up
+    centre: Point  #: [m]
+    along: Point  #: half of the axis [m]; p is across it, in units of its length
+    coefficients: tuple[float, ...]  #: of p, the constant first
+    speed: float  #: on the axis [m/s]
+    phase: float = 0.0  #: s at the start, on the way up
 
     def __call__(self, seconds: Vector) -> Vector:
         way = np.asarray(seconds) * self.speed / np.hypot(*self.along) + self.phase
@@ -189,11 +189,11 @@ def inside(states: Matrix, motions: Sequence[Motion]) -> NDArray[np.bool_]:
 class World:
     """Plant, start and data of `train` and `evaluate`, with a clock, for one run at a time."""
 
-    motions: Sequence[Motion]  # of the obstacles
-    predict: Predictor = known  # one of `PREDICTORS`
+    motions: Sequence[Motion]  #: of the obstacles
+    predict: Predictor = known  #: one of `PREDICTORS`
     _: KW_ONLY
-    fault: Fault = NONE  # the difference between plant and model
-    seen: Sequence[Motion] = ()  # motions that the controller predicts, by default `motions`
+    fault: Fault = NONE  #: the difference between plant and model
+    seen: Sequence[Motion] = ()  #: motions that the controller predicts, by default `motions`
 
     def __post_init__(self) -> None:
         self.states: list[Vector] = []  # of the episode so far, without noise

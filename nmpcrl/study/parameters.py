@@ -23,10 +23,10 @@ class Unfit(ValueError):
 class Allowed:
     """The values that a parameter may have."""
 
-    text: str  # the values in words, as they follow "must be"
-    read: Callable[[Any], Any]  # converts a value; ValueError and the like refuse it
-    choices: tuple[str, ...] = ()  # all values, if they are words
-    ends: tuple[float, float] | None = None  # the least and the largest, if they are numbers
+    text: str  #: the values in words, as they follow "must be"
+    read: Callable[[Any], Any]  #: converts a value; ValueError and the like refuse it
+    choices: tuple[str, ...] = ()  #: all values, if they are words
+    ends: tuple[float, float] | None = None  #: the least and the largest, if they are numbers
 
     def check(self, name: str, value: Any) -> Any:
         """Convert the value of a parameter to a type of Python's own, or raise ParameterError."""

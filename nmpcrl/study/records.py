@@ -42,7 +42,7 @@ class Stopped(StrEnum):
 class About(NamedTuple):
     """The experiment and the facts of a file."""
 
-    experiment: dict[str, Any]  # the fields when the file was written
+    experiment: dict[str, Any]  #: the fields when the file was written
     facts: dict[str, Any]
 
 
@@ -80,7 +80,7 @@ class Records:
     final_cost; of a stored run also versions, machine, key and sources, a hash of the code.
     """
 
-    experiment: dict[str, Any]  # the fields of the Experiment, or `Trial.stated`
+    experiment: dict[str, Any]  #: the fields of the Experiment, or `Trial.stated`
     steps: dict[str, Column]
     evaluations: dict[str, Column]
     facts: dict[str, Any]

@@ -21,14 +21,14 @@ from nmpcrl.study.trial import Trial
 class Job(NamedTuple):
     """The arguments of `train` and `evaluate` for a run."""
 
-    named: Experiment | Trial  # canonical
+    named: Experiment | Trial  #: canonical
     controller: Nmpc
     learner: Learner
     weights: Weights
     explore: Exploration
-    options: dict[str, Any]  # of `train` alone
-    environment: Mapping[str, Any] = MappingProxyType({})  # of `train` and `evaluate`
-    judged: int | np.random.SeedSequence = 0  # seed of each evaluation
+    options: dict[str, Any]  #: of `train` alone
+    environment: Mapping[str, Any] = MappingProxyType({})  #: of `train` and `evaluate`
+    judged: int | np.random.SeedSequence = 0  #: seed of each evaluation
 
 
 def job_of(named: Experiment | Trial) -> Job:

@@ -48,10 +48,10 @@ class Runs(dict[Experiment, Value]):
 class Store(Generic[Value]):
     """Values of one class in files, one for each experiment or trial."""
 
-    kind: Any  # the class
-    make: Callable[..., Value]  # called in workers
-    key: Callable[[Any], str]  # its beginning is in the name of a file
-    subfolder: str = ""  # of the folder of the runs
+    kind: Any  #: the class
+    make: Callable[..., Value]  #: called in workers
+    key: Callable[[Any], str]  #: its beginning is in the name of a file
+    subfolder: str = ""  #: of the folder of the runs
 
     def path_of(self, named: Named) -> Path:
         """The file of a value."""

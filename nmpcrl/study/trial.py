@@ -29,19 +29,19 @@ class Trial:
     ParameterError refuses a value that no key can be made of.
     """
 
-    learner: str  # name of the learner in tables and figures
-    make: Callable[..., Learner]  # (nmpc) -> learner, or (nmpc, rng) if it has an argument rng
+    learner: str  #: name of the learner in tables and figures
+    make: Callable[..., Learner]  #: (nmpc) -> learner, or (nmpc, rng) if it has an argument rng
     nmpc: Nmpc
-    theta: Any = None  # at the start; by default the theta of the `Problem`
-    seed: int = 0  # of the noise, of the environment and of `rng`
+    theta: Any = None  #: at the start; by default the theta of the `Problem`
+    seed: int = 0  #: of the noise, of the environment and of `rng`
     episodes: int = 30
-    steps: int = 100  # of an episode, at most
-    plant: Any = None  # as in `train`, like the next two
+    steps: int = 100  #: of an episode, at most
+    plant: Any = None  #: as in `train`, like the next two
     start: Any = None
     data: Any = None
-    deviation: Any = 1.0  # of the noise of Eq. (5), a number or one an input
-    decay_rate: float = 0.99  # c_epsilon, counted in time steps
-    evaluate_every: int = 5  # episodes between rollouts without noise
+    deviation: Any = 1.0  #: of the noise of Eq. (5), a number or one an input
+    decay_rate: float = 0.99  #: c_epsilon, counted in time steps
+    evaluate_every: int = 5  #: episodes between rollouts without noise
 
     def __post_init__(self) -> None:
         if not isinstance(self.nmpc, Nmpc):

@@ -14,6 +14,11 @@ from driver.project import ROOT, Failure, from_yaml, pages, shown
 from nmpcrl.course import exercises
 
 MOVED = {  # addresses of pages that are no more
+    "book/api": "api_control.html",
+    **dict.fromkeys(
+        [f"book/api_{room}" for room in ("analysis", "bench", "claims", "report", "studies")],
+        "api_study.html#api-rest",
+    ),
     "book/cluster": "reproduce.html#reproduce-cluster",
     "book/letter": "departures.html#departures-questions",
 }

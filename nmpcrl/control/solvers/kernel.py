@@ -98,27 +98,27 @@ inlined = njit(_nrt=False, **inner, **options)
 class Task(NamedTuple):
     """The problem of one solve, scaled."""
 
-    theta: np.ndarray  # (NTHETA,)
-    data: np.ndarray  # (N + 1, OWN + lines WIDTH)
-    lower: np.ndarray  # of an input, (NU,)
-    upper: np.ndarray  # (NU,)
-    sides: np.ndarray  # of the states' box: state, sign and limit, sign (x - limit) <= 0, (B, 3)
-    kind: np.ndarray  # of the rows of each stage, (N + 1, rows)
-    planned: np.ndarray  # 1 or 0, (rows of all stages,)
-    rate: np.ndarray  # scaled gamma^i, (N + 1,)
-    weights: np.ndarray  # W, (rows of all stages,)
-    first: int  # the first stage with a free input: 1 if u_0 is given, else 0
-    begin: int  # the first stage with a planned row, 0 or 1
-    rows: int  # of a stage
+    theta: np.ndarray  #: (NTHETA,)
+    data: np.ndarray  #: (N + 1, OWN + lines WIDTH)
+    lower: np.ndarray  #: of an input, (NU,)
+    upper: np.ndarray  #: (NU,)
+    sides: np.ndarray  #: of the states' box, state, sign and limit, sign (x - limit) <= 0, (B, 3)
+    kind: np.ndarray  #: of the rows of each stage, (N + 1, rows)
+    planned: np.ndarray  #: 1 or 0, (rows of all stages,)
+    rate: np.ndarray  #: scaled gamma^i, (N + 1,)
+    weights: np.ndarray  #: W, (rows of all stages,)
+    first: int  #: the first stage with a free input, 1 if u_0 is given, else 0
+    begin: int  #: the first stage with a planned row, 0 or 1
+    rows: int  #: of a stage
     lines: int
 
 
 class Point(NamedTuple):
     """An iterate."""
 
-    x: np.ndarray  # (N + 1, NX)
-    u: np.ndarray  # (N, NU)
-    h: np.ndarray  # (rows of all stages,), as all that follows
+    x: np.ndarray  #: (N + 1, NX)
+    u: np.ndarray  #: (N, NU)
+    h: np.ndarray  #: (rows of all stages,), as all that follows
     sigma: np.ndarray
     slack: np.ndarray
 
@@ -126,55 +126,55 @@ class Point(NamedTuple):
 class Duals(NamedTuple):
     """The multipliers of an iterate."""
 
-    lam: np.ndarray  # of the rows, in (0, W)
-    below: np.ndarray  # of the inputs' lower bounds, (N, NU)
-    above: np.ndarray  # (N, NU)
+    lam: np.ndarray  #: of the rows, in (0, W)
+    below: np.ndarray  #: of the inputs' lower bounds, (N, NU)
+    above: np.ndarray  #: (N, NU)
 
 
 class Stages(NamedTuple):
     """Derivatives at an iterate, and their condensed form; parts with u are unused at stage N."""
 
-    A: np.ndarray  # d x+ / d x, (N, NX, NX)
-    B: np.ndarray  # d x+ / d u, (N, NX, NU)
-    hx: np.ndarray  # gradients of the rows but the sides, (rows of all stages, NX)
-    hu: np.ndarray  # (rows of all stages, NU)
-    lx: np.ndarray  # of the objective, (N + 1, NX)
-    lu: np.ndarray  # of the objective, and from `condense` on of the bounds' barrier, (N + 1, NU)
-    px: np.ndarray  # of lam' h, (N + 1, NX)
-    pu: np.ndarray  # (N + 1, NU)
-    p: np.ndarray  # costates, (N + 1, NX)
-    gap: np.ndarray  # added to dx_i by a step besides A dx + B du: 0 along a plan, (N + 1, NX)
-    Q: np.ndarray  # Hessian of the Lagrangian, (N + 1, NX, NX)
-    S: np.ndarray  # (N + 1, NU, NX)
-    R: np.ndarray  # (N + 1, NU, NU)
-    q: np.ndarray  # Newton's right-hand side, (N + 1, NX)
-    r: np.ndarray  # (N + 1, NU)
-    off: np.ndarray  # dlam = stiff (off + dh), (rows of all stages,)
+    A: np.ndarray  #: d x+ / d x, (N, NX, NX)
+    B: np.ndarray  #: d x+ / d u, (N, NX, NU)
+    hx: np.ndarray  #: gradients of the rows but the sides, (rows of all stages, NX)
+    hu: np.ndarray  #: (rows of all stages, NU)
+    lx: np.ndarray  #: of the objective, (N + 1, NX)
+    lu: np.ndarray  #: of the objective, and from `condense` on of the bounds' barrier, (N + 1, NU)
+    px: np.ndarray  #: of lam' h, (N + 1, NX)
+    pu: np.ndarray  #: (N + 1, NU)
+    p: np.ndarray  #: costates, (N + 1, NX)
+    gap: np.ndarray  #: added to dx_i by a step besides A dx + B du, 0 along a plan, (N + 1, NX)
+    Q: np.ndarray  #: Hessian of the Lagrangian, (N + 1, NX, NX)
+    S: np.ndarray  #: (N + 1, NU, NX)
+    R: np.ndarray  #: (N + 1, NU, NU)
+    q: np.ndarray  #: Newton's right-hand side, (N + 1, NX)
+    r: np.ndarray  #: (N + 1, NU)
+    off: np.ndarray  #: dlam = stiff (off + dh), (rows of all stages,)
     stiff: np.ndarray
-    held: np.ndarray  # lam of planned rows, 0 of others
-    firm: np.ndarray  # stiff, likewise
-    pull: np.ndarray  # lam + off stiff, likewise
+    held: np.ndarray  #: lam of planned rows, 0 of others
+    firm: np.ndarray  #: stiff, likewise
+    pull: np.ndarray  #: lam + off stiff, likewise
 
 
 class Step(NamedTuple):
     """A Newton step, the feedback u = k + K x that makes it, and the recursion's intermediates."""
 
-    K: np.ndarray  # (N, NU, NX)
-    k: np.ndarray  # (N, NU)
-    x: np.ndarray  # (N + 1, NX)
-    u: np.ndarray  # (N, NU)
-    lam: np.ndarray  # (rows of all stages,)
+    K: np.ndarray  #: (N, NU, NX)
+    k: np.ndarray  #: (N, NU)
+    x: np.ndarray  #: (N + 1, NX)
+    u: np.ndarray  #: (N, NU)
+    lam: np.ndarray  #: (rows of all stages,)
     below: np.ndarray
     above: np.ndarray
-    p: np.ndarray  # costates, (N + 1, NX)
-    V: np.ndarray  # Hessian and gradient of the cost to go, (N + 1, NX, NX)
-    v: np.ndarray  # (N + 1, NX)
-    w: np.ndarray  # v + V gap, (NX,)
-    VA: np.ndarray  # (NX, NX)
-    VB: np.ndarray  # (NX, NU)
-    L: np.ndarray  # (NU, NU)
-    F: np.ndarray  # (NU, NX)
-    f: np.ndarray  # (NU,)
+    p: np.ndarray  #: costates, (N + 1, NX)
+    V: np.ndarray  #: Hessian and gradient of the cost to go, (N + 1, NX, NX)
+    v: np.ndarray  #: (N + 1, NX)
+    w: np.ndarray  #: v + V gap, (NX,)
+    VA: np.ndarray  #: (NX, NX)
+    VB: np.ndarray  #: (NX, NU)
+    L: np.ndarray  #: (NU, NU)
+    F: np.ndarray  #: (NU, NX)
+    f: np.ndarray  #: (NU,)
 
 
 @inlined

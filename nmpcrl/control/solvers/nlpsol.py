@@ -39,8 +39,8 @@ CLEARLY = 1e-6  # another plan is better if its value is less by this share
 class Nlpsol(Solver):
     """A solver that CasADi's `nlpsol` calls by its name."""
 
-    others: ClassVar[tuple[type["Nlpsol"], ...]] = ()  # tried in turn where this one finds no plan
-    starts: ClassVar[dict[Start, dict[str, Any]]]  # options of warm starts: stay near them
+    others: ClassVar[tuple[type["Nlpsol"], ...]] = ()  #: tried in turn where this one finds no plan
+    starts: ClassVar[dict[Start, dict[str, Any]]]  #: options of warm starts, stay near them
 
     @property
     @abstractmethod
@@ -88,7 +88,7 @@ class Fatrop(Nlpsol):
     """fatrop: an interior point that follows the stages, as fast as CasADi's get here."""
 
     name: ClassVar[str] = "fatrop"
-    others: ClassVar[tuple[type[Nlpsol], ...]] = (Ipopt,)  # slower and sturdier
+    others: ClassVar[tuple[type[Nlpsol], ...]] = (Ipopt,)  #: slower and sturdier
     starts: ClassVar[dict[Start, dict[str, Any]]] = {
         Start.SHIFTED: {"bound_push": 1e-3},
         Start.SAME: {"mu_init": 1e-4, "bound_push": 1e-6},

@@ -53,13 +53,13 @@ UNBOUNDED = 1e20  # stands for an input without a bound
 class Arguments(NamedTuple):
     """The first arguments of `kernel.solve`, by name; u_0 is free or fixed."""
 
-    data: Matrix  # d_0, ..., d_N
-    lower: Vector  # of the inputs, (m,)
+    data: Matrix  #: d_0, ..., d_N
+    lower: Vector  #: of the inputs, (m,)
     upper: Vector
-    sides: Matrix  # of the states' box: which state, its sign and its limit, (sides, 3)
-    kind: NDArray[np.int64]  # of rows and sides at each stage, (N + 1, rows), see `kernel`
-    discount: Vector  # gamma^0, ..., gamma^N
-    weights: Vector  # W of the rows, infinite where hard
+    sides: Matrix  #: of the states' box, which state, its sign and its limit, (sides, 3)
+    kind: NDArray[np.int64]  #: of rows and sides at each stage, (N + 1, rows), see `kernel`
+    discount: Vector  #: gamma^0, ..., gamma^N
+    weights: Vector  #: W of the rows, infinite where hard
     tie: float
 
 
@@ -87,7 +87,7 @@ class Riccati(Solver):
 
     name: ClassVar[str] = "riccati"
     code: Callable[[Problem], Any] = field(default=machine_code, repr=False)
-    starts: int = SEVERAL  # cold ones; if several, another is held by feedback, and the best counts
+    starts: int = SEVERAL  #: cold; of several, another is held by feedback, and the best counts
 
     def __post_init__(self) -> None:
         super().__post_init__()

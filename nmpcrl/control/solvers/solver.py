@@ -35,7 +35,7 @@ class Solver(ABC):
 
     name: ClassVar[str]
 
-    tolerance: float = TOLERANCE  # of the KKT conditions, as the solver scales them
+    tolerance: float = TOLERANCE  #: of the KKT conditions, as the solver scales them
 
     def __post_init__(self) -> None:
         if not LEAST_TOLERANCE <= self.tolerance <= LARGEST_TOLERANCE:

@@ -37,8 +37,8 @@ SOLVERS: dict[str, dict[str, Any]] = {
 class Run(NamedTuple):
     """An episode of the agent; a failed solve ends it."""
 
-    costs: Vector  # of each step
-    disturbances: Vector  # e of each step
+    costs: Vector  #: of each step
+    disturbances: Vector  #: e of each step
 
 
 def run(solver: str, seed: int, steps: int) -> Run:

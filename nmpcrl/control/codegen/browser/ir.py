@@ -24,8 +24,8 @@ class Function(NamedTuple):
     """A function that the module exports."""
 
     name: str
-    symbol: str  # in the IR
-    result: str  # its type
+    symbol: str  #: in the IR
+    result: str  #: its type
 
 
 def describe(texts: Mapping[str, str]) -> tuple[list[Function], str]:

@@ -1,0 +1,43 @@
+"""A Sphinx extension: what this book needs that Sphinx, MyST-NB and pandas leave out."""
+
+import sys
+from typing import Any
+
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
+
+from driver.project import ROOT
+
+FLOATS = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
+SHORT = "ndarray[tuple[Any, ...], dtype[float64]]"
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Document the library that lies beside the book, whichever is installed."""
+    sys.path.insert(0, str((ROOT / "nmpcrl").resolve().parent))
+    app.connect("autodoc-process-signature", with_aliases)
+    app.connect("doctree-resolved", with_aliases_of_fields)
+    app.connect("autodoc-process-docstring", without_macros, priority=400)  # before napoleon's
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def with_aliases(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, given: str | None, returned: str
+) -> tuple[str | None, str]:
+    """A signature with `Array` for `Vector` and `Matrix`, in the place of what Python makes of them."""
+    return given and given.replace(FLOATS, "Array"), returned and returned.replace(FLOATS, "Array")
+
+
+def with_aliases_of_fields(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """The type of a field, of which autodoc lets nobody change the signature."""
+    for node in list(doctree.findall(addnodes.desc_annotation)):
+        if SHORT in (words := node.astext()):
+            node.children = [nodes.Text(words.replace(SHORT, "Array"))]
+
+
+def without_macros(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
+    """A docstring in which `|speed|` is an absolute value and no macro of reStructuredText."""
+    lines[:] = [line.replace("|", r"\|") for line in lines]
