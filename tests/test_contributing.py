@@ -547,11 +547,6 @@ def test_the_projects_own_tests_take_what_was_added(scratch):
     assert done.returncode == 0, done.stdout
 
 
-def test_a_plant_is_added_by_the_example_of_the_readme():
-    assert re.search(r"\*\*A plant\*\*.*README trains one of its own", TEXT)
-    assert "plant = Plant(" in (ROOT / "README.md").read_text()
-
-
 @pytest.mark.weekly
 @pytest.mark.slow
 def test_the_lock_is_made_anew_where_the_row_says_so(scratch):

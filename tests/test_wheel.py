@@ -65,13 +65,11 @@ def test_readmes_example_runs_where_the_wheel_alone_is_installed(wheel, tmp_path
     if "No matching distribution" in done.stderr and "NMPCRL_REQUIRE_REGISTRY" not in os.environ:
         pytest.skip(f"the registry cannot be reached: {done.stderr.splitlines()[-1]}")
     assert done.returncode == 0, done.stderr
-    (example, *_) = re.findall(
+    (example,) = re.findall(
         r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), flags=re.M | re.S
     )
-    assert {"train(", "evaluate("} < {*re.findall(r"\b\w+\(", example)}
     done = subprocess.run(  # -I: without this folder, the user's packages and PYTHONPATH
         [python, "-I", "-c", example], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    before, after = map(int, re.findall(r"^cost without noise: (\d+)$", done.stdout, flags=re.M))
-    assert after < before
+    assert "'margin'" in done.stdout

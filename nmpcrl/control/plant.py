@@ -40,7 +40,15 @@ def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float, substeps
 class Plant(Described):
     """A plant that is sampled every `period` seconds.
 
-    Where a task has obstacles, the first two states are its position.
+    Where a task has obstacles, the first two states are its position. A mass that is pushed:
+
+        Plant(
+            lambda state, push: ca.vertcat(state[2:], push),
+            ("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
+            ("a_x [m/s2]", "a_y [m/s2]"),
+            lower=-np.ones(2),
+            upper=np.ones(2),
+        )
     """
 
     dynamics: Dynamics  #: d state / dt as a CasADi expression of (state, action)

@@ -5,16 +5,13 @@ from collections import Counter
 from functools import partial
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.bench.learners import ratio as ratio_of
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import published
 from nmpcrl.claims.finding import finding
 from nmpcrl.claims.paper_claims import BY_RUNS, BY_TIME, CLAIMS, kept_without_noise
-from nmpcrl.claims.rule import anew
 from nmpcrl.claims.timing import decide
 from nmpcrl.claims.verdict import UNDECIDABLE
 from nmpcrl.control import Nmpc
@@ -53,17 +50,14 @@ def test_the_first_paragraph_counts_the_published_verdicts():
 
 
 def test_the_numbers_of_runs_are_those_of_the_published_study():
-    parts = published.load().parts
-    varied = [parts[name] for name in design.VARIANTS if name in parts]
-    assert set(re.findall(r"(\d+) runs", README)) == {str(parts["main"]), str(sum(varied))}
-    assert f"in {len(varied)} ways" in README
-    assert re.search(rf"`make book` trains\s{len(design.fresh())} afresh", README)
+    assert f"the {published.load().parts['main']} runs" in README
+    assert f"trains {len(design.fresh())} runs afresh" in README.replace("\n", " ")
 
 
 def test_the_halves_of_c1_are_those_of_the_published_verdict():
     said = re.search(
-        r"every step, (\d+) of (\d+) DES runs and (\d+) of \d+ RDES runs diverge;.*? every episode,"
-        r" (\d+) and (\d+), .*? p = (0\.\d+)",
+        r"every step, (\d+) of (\d+) DES runs and (\d+) of \d+ RDES\s+runs diverge;.*?"
+        r" every episode, (\d+) and (\d+), .*? p =\s+(0\.\d+)",
         README.replace("\n", " "),
     )
     *numbers, p = said.groups()
@@ -77,14 +71,10 @@ def test_the_halves_of_c1_are_those_of_the_published_verdict():
     assert counts == {"step": (of, des, rdes), "episode": (of, des_episode, rdes_episode)}
 
 
-def test_c1_and_c3_are_said_with_both_of_their_intervals():
-    text, known = README.replace("\n", " "), published.load()
-    one, other = known.verdict("C1"), anew(known.verdict("C1"))
-    bounds = [f"{100 * end:.0f}" for end in (one.share, *one.interval, other.low, other.high)]
-    said = "in {} % of pairs of runs, {} to {} % with other seeds and {} to {} % with other layouts"
-    assert said.format(*bounds) in text
+def test_c3_is_said_at_both_times_of_a_solve():
+    known = published.load()
     slow = "{:.2f} to {:.2f} at the paper's".format(*ratios_at_paper_speed(known.timings))
-    assert f"{known.verdict('C3').ratio:.2f} with our faster Ipopt, {slow}" in text
+    assert f"{known.verdict('C3').ratio:.2f} with our faster Ipopt, {slow}" in README
 
 
 def test_c7_is_said_with_both_of_its_questions():
@@ -134,43 +124,18 @@ def test_published_verdicts_on_time_are_what_their_intervals_say():
         assert verdict.outcome == decide(ratio, claim.claimed, claim.near) != UNDECIDABLE
 
 
-def test_times_are_ratios_first_and_those_of_the_published_measurement():
-    found, said = published.load(), README.replace("\n", " ")
-    table = found.timings.set_index(["solver", "learner"])
-    times = table.ms_per_step.xs("ES", level="learner")
-    slower = [f"{times[solver] / times['riccati']:.0f}" for solver in ("ipopt", "fatrop")]
-    ratio = f"{ratio_of(found.timings, 'ipopt', 'RDES').value:.2f}"
-    assert re.findall(r"ES takes (\d+) times .* and (\d+) times as long with fatrop", said) == [
-        tuple(slower)
-    ]
-    assert re.findall(r"RDES takes ([\d.]+) of the time of one of ES", said) == [ratio]
+def test_times_are_ratios_of_the_published_measurement():
+    times = published.load().timings.set_index(["solver", "learner"]).ms_per_step
+    times = times.xs("ES", level="learner")
+    slower = tuple(f"{times[solver] / times['riccati']:.0f}" for solver in ("ipopt", "fatrop"))
+    found = r"ES takes (\d+) times as long with Ipopt and (\d+) times as long with fatrop"
+    assert re.findall(found, README.replace("\n", " ")) == [slower]
 
 
-def test_seconds_of_a_run_are_those_of_the_published_steps_and_name_their_processor():
-    found = published.load()
-    hours = found.timings.set_index(["solver", "learner"]).hours
-    seconds = [f"{3600 * hours['riccati', learner]:.0f}" for learner in ("ES", "RDES")]
-    said = re.findall(
-        r"of that measurement \(([^)]+)\) a run of 300 episodes takes about (\d+) seconds for ES"
-        r" and (\d+) for RDES",
-        README.replace("\n", " "),
-    )
-    assert said == [(found.timed["machine"]["processor"], *seconds)]
-    assert len(re.findall(r"seconds|microseconds|µs", README)) == 1
-
-
-def test_the_example_trains_a_plant_of_the_readers_own_as_the_text_says(capsys):
-    names: dict = {}
-    exec(EXAMPLES[0], names)
-    before, after = map(float, re.findall(r"cost without noise: (\d+)", capsys.readouterr().out))
-    said = re.search(r"the cost without noise from (\d+) to (\d+)\.", README)
-    np.testing.assert_allclose([before, after], [float(cost) for cost in said.groups()], atol=1)
-    assert names["explore"].scale.shape == (40, 60)  # "Forty episodes of 60 steps"
-
-
-def test_the_second_example_learns_each_parameter_of_its_problem(capsys):
-    names = {"ca": ca, "np": np, "Nmpc": partial(Nmpc, solver="fatrop")}  # which compiles nothing
-    exec(EXAMPLES[1], names)
+def test_the_example_learns_each_parameter_of_its_problem(capsys):
+    (example,) = EXAMPLES
+    names = {"Nmpc": partial(Nmpc, solver="fatrop")}  # which compiles nothing
+    exec(example.replace("Nmpc, ", ""), names)
     learned, problem = names["result"].vector, names["problem"]
     assert set(problem.split(learned)) == {"A", "B", "b", "margin"}
     assert all((learned != problem.theta).reshape(-1)[:4])
@@ -178,11 +143,15 @@ def test_the_second_example_learns_each_parameter_of_its_problem(capsys):
     assert "margin" in capsys.readouterr().out
 
 
-def test_the_layout_names_every_room_and_the_way_of_imports():
+def test_the_way_of_imports_names_every_package():
     rooms = {path.name for path in (ROOT / "nmpcrl").iterdir() if (path / "__init__.py").is_file()}
-    assert set(re.findall(r"^nmpcrl/(\w+)/ ", README, flags=re.M)) == rooms
     (way,) = re.findall(r"`(\w+ -> [^`]+)`", README)
     assert set(re.findall(r"\w+", way)) == rooms
+
+
+def test_it_is_short():
+    assert len(README.splitlines()) <= 130
+    assert len(README.split()) <= 900
 
 
 def test_links_lead_to_files():
