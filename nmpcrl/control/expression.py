@@ -105,3 +105,10 @@ def _refuse_unusable(name: str, written: ca.SX, allowed: ca.SX) -> None:
     except Exception as error:
         reason = str(error).strip().splitlines()[-1]
         raise ValueError(f"{name} cannot be differentiated by CasADi: {reason}") from error
+
+
+def refuse_other(usage: str, function: Any, arguments: int) -> None:
+    """Refuse a function that does not take so many arguments."""
+    wrong = mismatch(function, (None,) * arguments)
+    if wrong:
+        raise ValueError(f"{usage}: {wrong}")

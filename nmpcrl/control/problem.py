@@ -382,6 +382,17 @@ class Problem(Described):
         """theta with these parameters, and the starts of the others."""
         return self.names.filled(self.theta, values)
 
+    @property
+    def theta_sizes(self) -> Vector:
+        """Typical sizes of theta, (d,): its starts, 1 for 0, infinite where no plan depends on it.
+
+        The last is a constant of the value, as V0.
+        """
+        e, start = self.expressions, np.abs(self.theta)
+        plan = ca.veccat(e.next_x, e.stage, e.terminal, e.fixed, e.each)
+        held = np.array(ca.which_depends(plan, e.theta, 1), bool)
+        return np.where(held, np.where(start > 0, start, 1.0), np.inf)
+
     def stage_data(self, values: Mapping[str, Any] | None) -> Matrix:
         """d_0, ..., d_N, shape (N + 1, size), with these values and the defaults of the others."""
         return self._known if values is None else self.data_names.filled(self.data, values)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
+from nmpcrl.learning.bootstrap import NextValue, Transition
 from nmpcrl.learning.learners import Learner, UpdateRule, Weights, theta_bounds
 from nmpcrl.learning.optimisers import Bounds, GaussNewton, Optimiser
 
@@ -68,12 +68,13 @@ def td_statistics(transition: Transition, delta: float) -> Statistics:
 
 
 def lstd_q(
-    nmpc: Controller,
+    nmpc: Any,
     alpha: float = 1.0,
     *,
     every: int | None = None,
     regularisation: float = 1e-3,
     bounds: Bounds | None = None,
+    stride: float = np.inf,
     optimiser: Optimiser | None = None,
 ) -> Learner:
     """LSTD-Q: a Gauss-Newton step on the squared TD errors of a batch, targets held.
@@ -90,9 +91,13 @@ def lstd_q(
         every: steps of a batch; those of an episode if absent.
         regularisation: added to the diagonal of H.
         bounds: the least and the largest theta; those of a `Problem` if absent.
+        stride: of `GaussNewton`, with the start of an entry for its scale, or 1 if that is 0; an
+            entry that is no part of the plan, as V0, goes freely.
         optimiser: of g and H, such as `TrustRegion`; `GaussNewton` with the arguments above if
             absent.
     """
     bounds = bounds or theta_bounds(nmpc)
-    rule = batched(td_statistics, optimiser or GaussNewton(alpha, regularisation, bounds), every)
+    scale = nmpc.problem.theta_sizes if stride < np.inf else 1.0
+    own = optimiser or GaussNewton(alpha, regularisation, bounds, stride, scale)
+    rule = batched(td_statistics, own, every)
     return Learner.of("LSTD-Q", nmpc, rule, bounds=bounds, values_actions=True)

@@ -7,7 +7,7 @@ Functions of the user are given copies, and their results are copied, as numbers
 """
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
@@ -17,16 +17,13 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Task
-from nmpcrl.control.blocks import numbers
-from nmpcrl.control.expression import mismatch
+from nmpcrl.control.expression import mismatch, refuse_other
 from nmpcrl.control.solution import short
 
 # next state, cost l(s, a), whether the episode ends there, and whether only its time does
 Step = tuple[Vector, float, bool, bool]
 StepFunction = Callable[[Vector, Vector, np.random.Generator], tuple[Any, ...]]
 GymnasiumEnv = Any  # a `gymnasium.Env`, which need not be installed
-# of a `Problem`: a function of the time, or by name an array over the times of an episode
-Data = Callable[[int], Mapping[str, Any]] | Mapping[str, Any]
 Start = Vector | Callable[[np.random.Generator], Vector]
 PLANT = "plant is called as plant(state, action, rng) and returns (next state, cost, end)"
 
@@ -102,30 +99,6 @@ def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
     return step
 
 
-def forecasts(data: Data | None, horizon: int) -> Callable[[int], dict[str, Any]]:
-    """The options of `Nmpc.solve` at each time t of an episode: its data, or none.
-
-    Of an array over the times, a plan at t sees t, ..., t + N, and the last entry beyond its end.
-    """
-    if data is None:
-        return lambda _: {}
-    if callable(data):
-        refuse_other("data is called as data(t) and returns arrays by name", data, 1)
-        return lambda t: {
-            "data": {name: numbers(f"data {name}", one) for name, one in data(t).items()}
-        }
-    series = {name: np.array(values, float) for name, values in data.items()}
-    for name, values in series.items():
-        if not values.ndim or not len(values):
-            raise ValueError(f"data {name!r} must be an array with an axis of time in front")
-
-    def window(t: int) -> dict[str, Any]:
-        times = np.arange(t, t + horizon + 1)
-        return {"data": {name: v[np.minimum(times, len(v) - 1)] for name, v in series.items()}}
-
-    return window
-
-
 def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool) -> str:
     """Why no plan can begin in a state of the plant; "" if one can, or it is finite at the end."""
     largest = sys.float_info.max if nmpc is None or end else nmpc.farthest
@@ -157,13 +130,6 @@ def state_of(said: str, given: Any, states: int | None, *, finite: bool = True) 
         if state.size == (states or state.size) and not (finite and not np.isfinite(state).all()):
             return state
     raise ValueError(f"{said} {given}; a state is {states or 'a vector of'} finite numbers")
-
-
-def refuse_other(usage: str, function: Any, arguments: int) -> None:
-    """Refuse a function that does not take so many arguments."""
-    wrong = mismatch(function, (None,) * arguments)
-    if wrong:
-        raise ValueError(f"{usage}: {wrong}")
 
 
 def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:

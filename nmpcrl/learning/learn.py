@@ -12,10 +12,11 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Policy
 from nmpcrl.control.bending import Bending
+from nmpcrl.control.policy import Data
 from nmpcrl.control.solution import short
 from nmpcrl.control.vectors import spread
 from nmpcrl.learning.batches import lstd_q
-from nmpcrl.learning.environment import Data, GymnasiumEnv, StepFunction, stream
+from nmpcrl.learning.environment import GymnasiumEnv, StepFunction, stream
 from nmpcrl.learning.episode import Episode
 from nmpcrl.learning.episode import episodes as by_episode
 from nmpcrl.learning.learners import (
@@ -38,6 +39,7 @@ NAMED: dict[str, Callable[..., Learner]] = {
     "GES": gradient_expected_sarsa, "TDC": gradient_tdc,
 }  # fmt: skip
 DEVIATION = 0.05  # of the noise, in parts of the distance between the bounds of an input
+STRIDE = 0.3  # of LSTD-Q: the most by which an entry of theta moves at once, see `lstd_q`
 CLIPPED = 0.1  # of the actions at each of both bounds of an input, above which `learn` warns
 
 
@@ -100,7 +102,8 @@ def learn(
     Args:
         nmpc: plans and acts, and is what is learned.
         learner: its name, with its `options`, as in learn(nmpc, "QL", alpha=1e-4): LSTD-Q, which
-            needs no step size, QL, DPG, ES, GES or TDC. Or any `Learner`.
+            needs no step size, and here has a `stride` of 0.3, QL, DPG, ES, GES or TDC. Or any
+            `Learner`.
         plant: as in `train`, like `start` and `data`.
         episodes: how many, from a start each.
         steps: of an episode, at most.
@@ -153,16 +156,18 @@ def learn(
     elif resume is None and confirm:
         judge(weights.theta)
     try:
-        for one in by_episode(mover, nmpc, weights, explore, rng=rng, **around):
-            found.append(replace(one, number=done + one.number))
-            warn("overshoot", _overshoot(base, found[-1]))
-            warn("negative", _negative(nmpc, least, found[-1]))
-            if not absurd(one.weights, nmpc.largest):
-                weights = one.weights
-            if confirm and not undo and not (found[-1].number + 1) % confirm:
-                judge(one.weights.theta)
-            if callback is not None and callback(found[-1]) is False:
-                break
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "theta .* turned negative, and a cost")  # of a solve
+            for one in by_episode(mover, nmpc, weights, explore, rng=rng, **around):
+                found.append(replace(one, number=done + one.number))
+                warn("overshoot", _overshoot(base, found[-1]))
+                warn("negative", _negative(nmpc, least, found[-1]))
+                if not absurd(one.weights, nmpc.largest):
+                    weights = one.weights
+                if confirm and not undo and not (found[-1].number + 1) % confirm:
+                    judge(one.weights.theta)
+                if callback is not None and callback(found[-1]) is False:
+                    break
     except Diverged as error:
         diverged = str(error)
     history = _history(found, resume)
@@ -188,6 +193,7 @@ def _learner(nmpc: Nmpc, learner: Learner | str, options: dict[str, Any]) -> Lea
             f" of {', '.join(NAMED)} with options"
         )
     make = NAMED[learner]
+    options = ({"stride": STRIDE} if make is lstd_q else {}) | options
     try:
         inspect.signature(make).bind(nmpc, **options)
     except TypeError as error:

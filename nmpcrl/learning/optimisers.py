@@ -33,11 +33,14 @@ class GaussNewton:
     H is the curvature, shape (d, d), plus `regularisation` on its diagonal, and as much more as
     makes it positive definite. Without bounds p = -alpha H^-1 g. A projection of that p would be no
     minimum. A curvature that is not finite gives an infinite theta, which `train` calls diverged.
+    With a `stride`, an entry moves by no more than this part of the larger of itself and `scale`.
     """
 
     alpha: float = 1.0
     regularisation: float = 1e-3  #: in the unit of the curvature
     bounds: Bounds | None = None
+    stride: float = np.inf
+    scale: Vector | float = 1.0  # a typical size of each entry
 
     def __call__(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
         if not np.isfinite(curvature).all():
@@ -46,8 +49,10 @@ class GaussNewton:
         L = _factor(curvature, self.regularisation + max(0.0, -least))
         slope = np.linalg.solve(L, -self.alpha * gradient)
         p: Vector = np.linalg.solve(L.T, slope)
-        if self.bounds:
-            p = _within(p, L, slope, self.bounds[0] - theta, self.bounds[1] - theta)
+        if self.bounds or self.stride < np.inf:
+            most = self.stride * np.maximum(np.abs(theta), self.scale)
+            low, high = self.bounds or (-np.inf, np.inf)
+            p = _within(p, L, slope, np.maximum(low - theta, -most), np.minimum(high - theta, most))
         return theta + p
 
 

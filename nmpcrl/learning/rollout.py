@@ -7,12 +7,11 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Plant, SolverError
+from nmpcrl.control.policy import Data, forecasts
 from nmpcrl.learning.environment import (
-    Data,
     GymnasiumEnv,
     StepFunction,
     environment,
-    forecasts,
     nmpc_of,
     ran_away,
     stream,

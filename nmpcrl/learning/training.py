@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.control.policy import Data, forecasts
 from nmpcrl.control.solution import short
 from nmpcrl.control.vectors import positive_integer
 from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.environment import (
-    Data,
     GymnasiumEnv,
     StepFunction,
     environment,
-    forecasts,
     nmpc_of,
     ran_away,
     stream,

@@ -59,9 +59,25 @@ def test_predict_takes_many_observations_and_begins_anew_with_an_episode(nmpc, t
     actions, plans = policy.predict(np.array([STATE, -STATE]))
     assert actions.shape == (2, 1)
     again, _ = policy.predict(np.array([STATE, -STATE]), plans, np.array([True, False]))
-    cold, warm = nmpc.solve(STATE, theta), nmpc.solve(-STATE, theta, plans[1])
+    cold, warm = nmpc.solve(STATE, theta), nmpc.solve(-STATE, theta, plans[1][0])
     assert again.ravel().tolist() == [*cold.action, *warm.action]
     assert policy.predict(STATE)[0].shape == (1,)
+
+
+@pytest.mark.parametrize(
+    "data", [{"wind": 0.1 * np.arange(9.0)}, lambda t: {"wind": 0.1 * np.arange(t, t + 7.0)}]
+)
+def test_each_way_of_calling_sees_the_data_of_its_time(nmpc, theta, data):
+    """A forecast of 9 stages, of which 7 are seen at a time."""
+    loop = evaluate(nmpc, theta, 3, plant=moved(nmpc), start=STATE, data=data)
+    policy, wanted, before = Policy(nmpc, theta, data), loop.actions.tolist(), None
+    assert [policy(state).tolist() for state in loop.states] == wanted
+    policy.reset()
+    assert [policy.make_step(state)[:, 0].tolist() for state in loop.states] == wanted
+    for state, action in zip(loop.states, wanted, strict=True):
+        found, before = policy.predict(state, before)
+        assert found.tolist() == action
+    assert policy.predict(STATE, before, np.array([True]))[0].tolist() == wanted[0]
 
 
 def test_a_policy_is_saved_and_loaded_to_the_last_bit(nmpc, theta, tmp_path):
