@@ -38,6 +38,7 @@ def test_what_the_package_imports_is_pinned():
     project = PROJECT["project"]
     extras = project["optional-dependencies"].values()
     needed = {*project["dependencies"], *(name for extra in extras for name in extra)}
+    needed = {name for name in needed if not name.startswith("nmpcrl[")}  # another extra
     assert set(map(canonicalize_name, needed)) <= set(versions(pins()))
 
 

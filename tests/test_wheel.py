@@ -53,23 +53,61 @@ def test_the_package_works_where_the_wheel_is_unpacked(wheel, tmp_path):
     assert done.stdout.split() == ["riccati", str(tmp_path / "nmpcrl/__init__.py")], done.stderr
 
 
-@pytest.mark.slow
+EXAMPLE = re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.M | re.S)[0]
+OF_EXTRA = {  # what runs with each
+    "": EXAMPLE + EXAMPLE.replace(', solver="fatrop"', ""),
+    "[gymnasium]": EXAMPLE + """
+from nmpcrl.learning import as_gymnasium
+env = as_gymnasium(nmpc, plant=plant, start=[0.0])
+result.policy.predict(env.reset(seed=0)[0])
+""",
+    "[torch]": EXAMPLE + """
+import torch
+from nmpcrl.torch import Layer
+theta = torch.tensor(result.vector, requires_grad=True)
+Layer(nmpc)([[0.5]], theta)[0].sum().backward()
+assert theta.grad[1] == 1
+""",
+    "[study]": """
+from nmpcrl.__main__ import main
+import sys
+sys.argv[1:] = "train --learner RDES --episodes 1 --steps 3".split()
+main()
+""",
+    "[book]": "import ipykernel, papermill\nfrom nmpcrl.report.figures.runs import trials",
+}  # fmt: skip
+BARE = 750  # MB that an installation without extras may take, of which CasADi and LLVM are 450
+
+
+@pytest.mark.weekly
 @pytest.mark.network
-def test_readmes_example_runs_where_the_wheel_alone_is_installed(wheel, tmp_path):
-    """With what it declares, at our versions: no book, no extra, nothing of this environment."""
+@pytest.mark.parametrize("extra", OF_EXTRA)
+def test_each_extra_brings_what_its_part_needs(extra, wheel, tmp_path):
+    """With what the wheel declares, at our versions, and nothing of this environment."""
     venv.create(tmp_path / "bare", with_pip=True)
     python = tmp_path / "bare/bin/python"
+    before = _megabytes(tmp_path / "bare")
     pins = ROOT / "environment.txt"
-    install = [python, "-m", "pip", "install", "-q", "--no-compile", "-c", pins, wheel]
+    install = [python, "-m", "pip", "install", "-q", "--no-compile", "-c", pins, f"{wheel}{extra}"]
     done = subprocess.run(install, capture_output=True, text=True)
     if "No matching distribution" in done.stderr and "NMPCRL_REQUIRE_REGISTRY" not in os.environ:
         pytest.skip(f"the registry cannot be reached: {done.stderr.splitlines()[-1]}")
     assert done.returncode == 0, done.stderr
-    (example,) = re.findall(
-        r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), flags=re.M | re.S
-    )
+    taken = _megabytes(tmp_path / "bare") - before
+    assert extra or taken < BARE
     done = subprocess.run(  # -I: without this folder, the user's packages and PYTHONPATH
-        [python, "-I", "-c", example], cwd=tmp_path, capture_output=True, text=True
+        [python, "-I", "-c", OF_EXTRA[extra]], cwd=tmp_path, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    assert "'margin'" in done.stdout
+
+
+@pytest.mark.slow
+def test_the_command_says_which_extra_brings_it():
+    script = "import sys; sys.modules['click'] = None; from nmpcrl.__main__ import main; main()"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "pip install 'nmpcrl[study]' brings the command" in done.stderr
+
+
+def _megabytes(folder: Path) -> float:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6

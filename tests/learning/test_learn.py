@@ -85,7 +85,7 @@ def test_lstd_q_needs_no_bounds_of_theta():
     nmpc = Nmpc(linear, solver="fatrop")
     how = {"plant": plant, "start": [0, 0.15], "episodes": 4, "every": 20, "confirm": 1}
     assert learn(nmpc, stride=np.inf, **how).costs[-1] > 1e4
-    result = learn(nmpc, undo=True, **how)
+    result = learn(nmpc, **how)
     moved = np.abs(np.diff(result.history["theta"], axis=0))
     size = np.maximum(np.abs(result.history["theta"][:-1]), linear.theta_sizes)
     assert (moved / size).max() == pytest.approx(0.3)

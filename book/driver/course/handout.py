@@ -67,7 +67,8 @@ def requirements(library: str) -> str:
     Args:
         library: the file of the library, beside the list.
     """
-    needed = _brought({*PROJECT["dependencies"], *BESIDE})
+    extras = PROJECT["optional-dependencies"]
+    needed = _brought({*PROJECT["dependencies"], *extras["torch"], *extras["study"], *BESIDE})
     pinned = pins(ROOT / "environment.txt").items()  # with a marker: on some machines only
     lines = [line for name, line in pinned if name in needed or ";" in line]
     lab = pins(ROOT / "book/lab.txt")["jupyterlab"]
