@@ -7,7 +7,7 @@ from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
 from nmpcrl.control.policy import Policy
 from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError, Status
-from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
+from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati, real_time
 from nmpcrl.control.task import Obstacle, Task
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "Status",
     "Task",
     "differential_drive",
+    "real_time",
     "rk4",
     "unicycle",
 ]

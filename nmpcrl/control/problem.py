@@ -45,7 +45,8 @@ class Soft:
     """Rows h <= sigma, sigma >= 0, with a discounted cost of `weight` for a unit of each slack."""
 
     row: Callable[..., Any]  #: (x, u, th) -> h, a number or a column; with d where there are data
-    weight: Any = 1.0  #: W > 0, a number, or one a row
+    #: W > 0, a number, or one a row; or th -> W, a learned number: slacks are then in units of cost
+    weight: Any = 1.0
     stages: Any = None  #: among 0, ..., N, an index, a slice or a list; all possible ones if None
     each: str | None = None  #: a table in data, every line of it has these rows, and is d[each]
 
@@ -230,7 +231,11 @@ class Problem(Described):
             held = _stages(name, one.stages, self.horizon, on_inputs=bool(on_inputs.any()))
             weight: Vector = np.full(size, np.inf)
             if isinstance(one, Soft):
-                weight = spread(f"{name}.weight", one.weight, (size,), "a row", positive=True)
+                price: Any = one.weight
+                if callable(price):  # W h with a price of 1 costs what h costs with W
+                    price, factor = 1.0, (price, (th,), {"theta": theta}, 1, "weight")
+                    row = row * expression(f"{name}.weight", *factor)
+                weight = spread(f"{name}.weight", price, (size,), "a row", positive=True)
             group = each if one.each else fixed
             group.append((row, weight, np.tile(held[:, None], size), on_inputs))
         (fixed_rows, *of_fixed), (each_rows, *of_each) = (

@@ -25,6 +25,8 @@ from nmpcrl.learning.learners import (
 from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.optimisers import Descent, GaussNewton, TrustRegion
 from nmpcrl.learning.policy_gradient import policy_gradient
+from nmpcrl.learning.remedies import scheduled
+from nmpcrl.learning.replay import replayed
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import (
     Diverged,
@@ -50,6 +52,6 @@ __all__ = [
     "count_episodes", "count_steps", "curvature_correction", "deep_expected_sarsa", "episodes",
     "evaluate", "expected_sarsa", "frozen", "gradient_expected_sarsa", "gradient_td_step",
     "gradient_tdc", "learn", "lstd_q", "policy_gradient", "project", "q_learning",
-    "random_direction", "regularized_deep_expected_sarsa", "semi_gradient_step", "step_matched",
-    "td_error", "train",
+    "random_direction", "regularized_deep_expected_sarsa", "replayed", "scheduled",
+    "semi_gradient_step", "step_matched", "td_error", "train",
 ]  # fmt: skip

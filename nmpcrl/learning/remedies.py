@@ -6,6 +6,7 @@
 | GES-3     | gradient TD, beta = 3 alpha, and steps of w that cannot overshoot          |
 | guarded   | what a learner would, with alpha at most 1 / ||phi||^2                     |
 | directed  | the direction of ES, as far as a learner would                             |
+| scheduled | what a learner would, by a part that changes with the steps                |
 | averaged  | what a learner would; what is judged is the mean theta                     |
 | undone    | what a learner would, and back where a rollout without noise costs more    |
 
@@ -77,7 +78,7 @@ def guarded(learner: Learner, alpha: float) -> Learner:
     Raises:
         ValueError: its rule is not proportional to alpha, since it moves theta by batches.
     """
-    rule = _of_each_step(learner, "a guard")
+    rule = of_each_step(learner, "a guard")
     own = replace(rule, step=partial(_guarded, rule.step, alpha))
     return replace(learner, name=f"{learner.name} guarded", rule=own)
 
@@ -92,11 +93,11 @@ def _guarded(
 
 def directed(learner: Learner, alpha: float) -> Learner:
     """The control of a remedy: its lengths, in the direction of ES, which has step size alpha."""
-    rule = as_far_as(_of_each_step(learner, "this control"), semi_gradient(alpha))
+    rule = as_far_as(of_each_step(learner, "this control"), semi_gradient(alpha))
     return replace(learner, name=f"{learner.name} directed", rule=rule)
 
 
-def _of_each_step(learner: Learner, who: str) -> UpdateRule:
+def of_each_step(learner: Learner, who: str) -> UpdateRule:
     """The rule of a learner, which has no memory but w."""
     if learner.rule.init not in (no_memory, first_w):
         raise ValueError(f"{who} needs a rule that moves theta at every step; {learner.name} has a"
@@ -139,6 +140,40 @@ def averaged(learner: Learner, skip: int = 0) -> Learner:
     Source: Polyak and Juditsky (1992).
     """
     return _wrapped(learner, "averaged", Averaging(learner.bounded_rule, skip))
+
+
+class Counted(NamedTuple):
+    """The memory of a `scheduled` rule."""
+
+    steps: int
+    inner: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Scheduling:
+    """The functions of a rule that goes a part of its way."""
+
+    rule: UpdateRule
+    part: Callable[[int], float]
+
+    def init(self, weights: Weights) -> Counted:
+        return Counted(0, self.rule.init(weights))
+
+    def step(self, theta: Vector, memory: Counted, *given: Any) -> tuple[Vector, Counted]:
+        moved, inner = self.rule.step(theta, memory.inner, *given)
+        return theta + self.part(memory.steps) * (moved - theta), Counted(memory.steps + 1, inner)
+
+    def interrupted(self, theta: Vector, memory: Counted) -> tuple[Vector, Counted]:
+        theta, inner = self.rule.interrupted(theta, memory.inner)
+        return theta, memory._replace(inner=inner)
+
+
+def scheduled(learner: Learner, part: Callable[[int], float]) -> Learner:
+    """A learner whose step k moves theta by `part(k)` of its way: alpha becomes alpha part(k).
+
+    scheduled(q_learning(nmpc, 1e-3), lambda k: 1 / (1 + k / 500)) is Robbins and Monro's (1951).
+    """
+    return _wrapped(learner, "scheduled", Scheduling(learner.bounded_rule, part))
 
 
 class Best(NamedTuple):
@@ -194,7 +229,7 @@ def undo(learner: Learner, confirm: Callable[[Vector], float], every: int = 1) -
     return _wrapped(learner, "undone", Undoing(learner.bounded_rule, confirm, every))
 
 
-def _wrapped(learner: Learner, how: str, own: Averaging | Undoing) -> Learner:
+def _wrapped(learner: Learner, how: str, own: Averaging | Scheduling | Undoing) -> Learner:
     rule = UpdateRule(own.step, own.init, own.interrupted)
     return replace(learner, name=f"{learner.name} {how}", rule=rule)
 

@@ -1,6 +1,7 @@
 """Ways to solve Eq. (2): CasADi's solvers, and one that is generated for a plant."""
 
 from nmpcrl.control.solvers.nlpsol import Fatrop, Ipopt
+from nmpcrl.control.solvers.realtime import real_time
 from nmpcrl.control.solvers.riccati import Riccati
 from nmpcrl.control.solvers.solver import (
     LARGEST_TOLERANCE,
@@ -20,6 +21,7 @@ __all__ = [
     "Prepared",
     "Riccati",
     "Solver",
+    "real_time",
     "solver_of",
 ]
 

@@ -1,0 +1,81 @@
+"""Replay, by hand and beside learning without it; schedules of step sizes."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.control import Nmpc, Parameter, Problem
+from nmpcrl.learning import (
+    Exploration,
+    Weights,
+    learn,
+    lstd_q,
+    policy_gradient,
+    q_learning,
+    replayed,
+    scheduled,
+    train,
+)
+
+ALPHA = 0.05
+
+
+@pytest.fixture(scope="module")
+def nmpc() -> Nmpc:
+    """A level whose gain the plan has wrong, and a known inflow."""
+    problem = Problem(
+        states=1, inputs=1, horizon=4, gamma=0.9, lower=-1, upper=1,
+        theta={"gain": Parameter(0.5, 0.1, 2), "V0": 0.0}, data={"inflow": 0.0},
+        model=lambda x, u, th, d: 0.9 * x + th["gain"] * u + d["inflow"],
+        stage=lambda x, u, th, d: (x - 1) ** 2 + 0.1 * u**2,
+        initial=lambda x, th, d: th["V0"],
+    )  # fmt: skip
+    return Nmpc(problem, solver="fatrop")
+
+
+def plant(x, u, rng, t):
+    return 0.9 * x + 0.7 * u + 0.1 * np.sin(t), float((x[0] - 1) ** 2 + 0.1 * u[0] ** 2), False
+
+
+WORLD = {"plant": plant, "start": lambda rng: rng.uniform(0, 1, 1),
+         "data": {"inflow": 0.1 * np.sin(np.arange(40))}}  # fmt: skip
+
+
+def steps(learner, nmpc, count):
+    explore = Exploration(episodes=1, steps=count, deviation=0.2)
+    return list(train(learner, nmpc, Weights(nmpc.problem.theta), explore, **WORLD))
+
+
+def test_a_replayed_step_is_a_step_along_the_transition_solved_anew(nmpc):
+    """Only the last transition is kept, so that it is the one that is drawn."""
+    base = q_learning(nmpc, ALPHA)
+    (plain,), (found,) = steps(base, nmpc, 1), steps(replayed(base, nmpc, 1, size=1), nmpc, 1)
+    theta, inflow = plain.weights.theta, WORLD["data"]["inflow"]
+    now, after = ({"inflow": inflow[t : t + 5]} for t in (0, 1))
+    again = nmpc.solve(plain.state, theta, action=plain.action, data=now)
+    value = nmpc.solve(plain.next_state, theta, data=after).value
+    delta = plain.cost + 0.9 * value - again.value
+    by_hand = theta + ALPHA * delta * again.features
+    np.testing.assert_allclose(found.weights.theta, by_hand, atol=1e-7)
+
+
+def test_replay_learns_more_of_as_many_steps_on_the_plant(nmpc):
+    base = q_learning(nmpc, ALPHA)
+    how = WORLD | {"episodes": 3, "steps": 15, "deviation": 0.2}
+    once, often = (learn(nmpc, one, **how).theta["gain"] for one in (base, replayed(base, nmpc, 8)))
+    assert once < often < 0.75
+
+
+@pytest.mark.parametrize("make", [lstd_q, policy_gradient])
+def test_a_learner_of_batches_is_refused(nmpc, make):
+    with pytest.raises(ValueError, match="replay needs a rule that moves theta at every step"):
+        replayed(make(nmpc), nmpc)
+
+
+def test_a_schedule_takes_a_part_of_each_step(nmpc):
+    base = q_learning(nmpc, ALPHA)
+    parts = [1.0, 0.5, 0.0, 0.0]
+    found = steps(scheduled(base, parts.__getitem__), nmpc, 4)
+    thetas = [nmpc.problem.theta, *(step.weights.theta for step in found)]
+    for k, step in enumerate(found):
+        whole = ALPHA * step.update.delta * step.solution.features
+        np.testing.assert_allclose(thetas[k + 1] - thetas[k], parts[k] * whole, atol=1e-12)
