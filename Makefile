@@ -21,8 +21,8 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
 
-course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; SECRET=FILE draws other numbers
-	@$(BIN)/python book/course.py $(if $(SECRET),--secret "$(SECRET)")
+course: .venv/ready  ## Notebooks for students and teachers, and slides of the built book, in _build/course
+	@$(BIN)/python book/course.py
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke
@@ -60,8 +60,8 @@ test-weekly: .venv/ready  ## What no push waits for: Firefox, all themes, many p
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab $(if $(ONLY),-k "$(ONLY)") tests/book/test_lab.py
 
-test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
-	@$(PYTEST) -m course $(if $(ONLY),-k "$(ONLY)") tests/book/test_course.py tests/course/test_graded_chapters.py
+test-course: .venv/ready  ## Grade every notebook of the course, empty and solved, and compare the editions with nbgrader
+	@$(PYTEST) -m course $(if $(ONLY),-k "$(ONLY)") tests/book/test_course.py
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks without executing any
 	@$(BIN)/ruff check .

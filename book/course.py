@@ -1,9 +1,4 @@
-"""Make the editions for a course: `driver/course/course.py` says how."""
-
-import os
-
-# One thread a process, kernels included, and before NumPy or torch is imported.
-os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+"""Make the material of a course: `driver/course/course.py` says what."""
 
 from driver.course.course import main
 

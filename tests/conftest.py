@@ -15,7 +15,6 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from filelock import FileLock
 from hypothesis import settings
 
 from nmpcrl.analysis.summary import RunSummary
@@ -34,7 +33,6 @@ NEEDS = {  # fixture -> the markers of a test that asks for it, directly or thro
     "browser": "browser",
     "distributed_firefox": "browser weekly",
     "jupyter_lab": "lab",
-    "nbgrader": "network",
 }
 PLACES = {  # marker -> where `make` looks for the tests that have it
     marker: places.split()
@@ -105,44 +103,6 @@ def shared(tmp_path_factory) -> Path:
     """A folder that the workers of a session have in common."""
     own = tmp_path_factory.getbasetemp()
     return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
-
-
-@pytest.fixture(scope="session")
-def long_runs(shared) -> dict[str, Path]:
-    """What every edition of the course holds stored, as `make course` finds or trains it."""
-    from driver.course import course, offline
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("NMPCRL_RUNS", str(RUNS if RUNS.is_dir() else shared / "long_runs"))
-        return offline.stored(course.chapters())
-
-
-@pytest.fixture
-def edition_of_course(shared, long_runs, tmp_path) -> Iterator[Callable[[str], Path]]:
-    """A copy of an edition of the course, which is made once for all workers.
-
-    It holds what chapters have trained in copies of other tests: each trains it once, not thrice.
-    """
-    from driver.course import course
-
-    trained, lock = shared / "trained", FileLock(shared / "editions.lock")
-    copies = []
-
-    def copy(name: str) -> Path:
-        place, half = (shared / "editions" / f"{part}{name}" for part in ("", "half-"))
-        with lock:
-            if not place.exists():
-                course.edition(name, half, long_runs)
-                half.rename(place)
-            copies.append(shutil.copytree(place, tmp_path / name))
-            trained.mkdir(exist_ok=True)
-            shutil.copytree(trained, copies[-1] / "data/runs", dirs_exist_ok=True)
-        return copies[-1]
-
-    yield copy
-    with lock:
-        for path in (path for place in copies for path in place.glob("data/runs/*.npz")):
-            shutil.copy2(path, trained)
 
 
 @pytest.fixture

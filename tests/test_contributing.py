@@ -248,7 +248,6 @@ def ends(runs: Runs[Records]) -> Figure:
     "chapter": {
         "book/08_again.ipynb": copied("01_mdp_and_nmpc"),
         "_toc.yml": replaced("book/07_beyond\n", "book/07_beyond\n      - file: book/08_again\n"),
-        "book/syllabus.yml": entered("chapters", "  08_again: {short: Again, needs: {}}\n"),
         "book/reproduce.md": replaced(
             "| `solver` |", "| `08_again` | `layout`, `horizon` |\n| `solver` |"
         ),
@@ -413,11 +412,9 @@ assert "theta ends in 1 places" in names["figure"].get_suptitle()
     "chapter": """
 from driver import project
 from driver.build import chapters
-from driver.teaching import teaching
 
 assert project.ROOT.samefile(".")
 assert "08_again" in project.notebooks()
-assert "Again" in teaching.filled("<!-- syllabus: graph -->")
 assert isinstance(chapters.ask(chapters.known("08_again"), {"layout": "D"}), chapters.Needs)
 """,
     "live figure": """

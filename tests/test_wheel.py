@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import venv
@@ -9,9 +10,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from driver.course import course
 
 ROOT = Path(__file__).resolve().parents[1]
+IGNORED = shutil.ignore_patterns("__pycache__")
+OFFLINE = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
 SCRIPT = """
 import nmpcrl
 from nmpcrl.study import lock, paper
@@ -23,11 +25,15 @@ print(paper.nmpc().solve(paper.START, paper.THETA_INIT).solver, nmpcrl.__file__)
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """As a course hands it out."""
-    name, content = course.wheel()
-    path = tmp_path_factory.mktemp("wheel") / name
-    path.write_bytes(content)
-    return path
+    """Built from a copy of the sources, without a network."""
+    folder = tmp_path_factory.mktemp("wheel")
+    shutil.copytree(ROOT / "nmpcrl", folder / "source/nmpcrl", ignore=IGNORED)
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy2(ROOT / name, folder / "source")
+    command = [sys.executable, "-m", "pip", "wheel", *OFFLINE, "-w", folder, folder / "source"]
+    subprocess.run(command, check=True)
+    (made,) = folder.glob("*.whl")
+    return made
 
 
 @pytest.mark.slow

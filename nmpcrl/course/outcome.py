@@ -1,25 +1,13 @@
-"""What a check says of an answer: it is right, or it is not, and then why.
+"""What a check says of an answer: a right one gets an `Outcome`, any other an `Unsolved`."""
 
-The functions of this package return an `Outcome` for a right answer and raise `Unsolved` for any
-other. An `exercise` of a chapter raises only in an edition for students and in a build of the book,
-where NMPCRL_STRICT is set when this is imported; elsewhere it says the same, in an `Outcome` that
-is not right, and the chapter runs to its end.
-"""
-
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from nmpcrl.study.refusal import Refusal
 
 MIME = "application/vnd.nmpcrl.check+json"  # of what the page is given
-STRICT = bool(os.environ.get("NMPCRL_STRICT"))  # no answer can change it later
 UNANSWERED = "Not answered yet: put your answer where the dots are, run that cell, then this one."
-
-P = ParamSpec("P")
-Check = TypeVar("Check", bound=Callable[..., Any])
 
 
 class Unsolved(Refusal):
@@ -28,11 +16,10 @@ class Unsolved(Refusal):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a check says."""
+    """What a check says of a right answer."""
 
     said: str
     page: Mapping[str, Any] | None = None  # with which the page checks the same answer
-    right: bool = True
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
         """The sentence, and what the page is given."""
@@ -47,33 +34,3 @@ def refuse_unanswered(answer: Any) -> None:
     """
     if answer is ...:
         raise Unsolved(UNANSWERED)
-
-
-def exercise(check: Callable[P, Outcome]) -> Callable[P, Outcome]:
-    """The check of an exercise, which a chapter calls: unless it has to, it does not raise."""
-
-    @wraps(check)
-    def said(*args: P.args, **kwargs: P.kwargs) -> Outcome:
-        try:
-            return check(*args, **kwargs)
-        except Unsolved as unsolved:
-            if STRICT:
-                raise
-            return Outcome(str(unsolved), right=False)
-
-    return said
-
-
-def varied(**numbers: tuple[float, float, float]) -> Callable[[Check], Check]:
-    """A check of which a number of the question may have another value, as `variants` draws it.
-
-    Args:
-        numbers: of an argument, whose default the question prints, the least value, the largest
-            one, and the step between two.
-    """
-
-    def marked(check: Check) -> Check:
-        vars(check)["varied"] = numbers
-        return check
-
-    return marked

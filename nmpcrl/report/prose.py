@@ -3,7 +3,6 @@
 import ast
 import inspect
 import re
-from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from textwrap import dedent
@@ -55,29 +54,6 @@ def filled(template: str, *, origin: str = "", **numbers: Any) -> str:
         return cited(words, value, f"{name.replace('_', ' ')}: {origin}")
 
     return PLACEHOLDER.sub(shown, text)
-
-
-def said(source: str, texts: Sequence[str]) -> dict[str, str]:
-    """What a cell's calls of `say` wrote in the place of each name.
-
-    Args:
-        source: of the cell.
-        texts: what it displayed as Markdown, one for each call.
-    """
-    calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
-    templates = [
-        inspect.cleandoc(call.args[0].value)
-        for call in calls
-        if isinstance(call.func, ast.Name) and call.func.id == "say"
-        if isinstance(call.args[0], ast.Constant) and isinstance(call.args[0].value, str)
-    ]
-    numbers: dict[str, str] = {}
-    for template, text in zip(templates, texts, strict=False):
-        fixed = [re.escape(part) for part in re.split(PLACEHOLDER.pattern, template)[::3]]
-        names = [found[1] for found in PLACEHOLDER.finditer(template)]
-        if found := re.fullmatch("(.*?)".join(fixed), text, flags=re.S):
-            numbers |= dict(zip(names, found.groups(), strict=True))
-    return numbers
 
 
 def _in_formula(found: re.Match[str]) -> bool:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nmpcrl.course import Unsolved, formula
+from nmpcrl.course import Unsolved
 from nmpcrl.course.behaviour import TIMES, function
 from nmpcrl.course.cases import telling
 
@@ -19,17 +19,6 @@ def test_a_known_mistake_that_shows_in_one_case_of_a_hundred_is_always_met():
                 above,
                 lambda rng: {"x": float(rng.uniform())},
                 mistakes={"Some are above.": lambda x: False},
-            )
-
-
-def test_so_is_one_of_a_formula():
-    for _ in range(20):
-        with pytest.raises(Unsolved, match="Beyond that"):
-            formula(
-                "x",
-                lambda x: min(x, 0.99),
-                {"x": (0, 1)},
-                mistakes={"Beyond that it stays.": lambda x: x},
             )
 
 

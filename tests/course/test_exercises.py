@@ -1,16 +1,23 @@
-"""Exercises as groups of cells: what belongs together, and what a solution puts where."""
+"""Exercises as groups of cells, in a notebook of this test's own and in every chapter."""
 
+from itertools import pairwise
+from pathlib import Path
+
+import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from nmpcrl.course.exercises import About, NoExercise, exercises, reopened, solved
+from nmpcrl.course.exercises import NoExercise, clear_solutions, exercises, tags_of
 
-ABOUT = {"kind": "by hand", "level": 1, "minutes": 5, "points": 1, "goal": "compute"}
+BOOK = Path(__file__).resolve().parents[2] / "book"
+NOTEBOOKS = {path.stem: nbformat.read(path, 4) for path in sorted(BOOK.glob("*.ipynb"))}
+EXERCISED = [name for name, notebook in NOTEBOOKS.items() if any(exercises(notebook))]
+HEAD = '<a id="ex-{}"></a>\n**Exercise 1.{}.** *5 minutes, {} points.* How?'
+ANSWER = "x = ...  # a number\n### BEGIN SOLUTION\nx = 2\n### END SOLUTION"
 
 
-def markdown(source: str, tag: str, **about):
-    ours = {"nmpcrl": {"exercise": about}} if about else {}
-    return new_markdown_cell(source, metadata={"tags": [tag]} | ours)
+def markdown(source: str, tag: str):
+    return new_markdown_cell(source, metadata={"tags": [tag]})
 
 
 def code(source: str, tag: str):
@@ -20,12 +27,12 @@ def code(source: str, tag: str):
 def notebook():
     return new_notebook(
         cells=[
-            markdown('<a id="ex-one"></a>\n**Exercise 1.1.** How?', "exercise", **ABOUT),
+            markdown(HEAD.format("one", 1, 3), "exercise"),
             markdown("Think.", "hint"),
-            code("x = ...", "answer"),
+            code(ANSWER, "answer"),
             code("check.one(x)", "check"),
-            markdown("So:\n\n```python\nx = 2\n```\n\nor\n\n```text\nx = 3\n```", "solution"),
-            markdown('<a id="ex-two"></a>\n**Exercise 1.2.** Why?', "exercise", **ABOUT),
+            markdown("So.", "solution"),
+            markdown(HEAD.format("two", 2, 1), "exercise"),
             markdown("As.", "solution"),
             new_markdown_cell("The end."),
             markdown("A loose one.", "hint"),
@@ -35,57 +42,47 @@ def notebook():
 
 def test_a_group_goes_from_its_text_to_the_next_cell_of_another_kind():
     one, two = exercises(notebook())
-    assert (one.name, one.number, two.name, two.number) == ("one", "1.1", "two", "1.2")
-    assert {part: len(cells) for part, cells in one.parts.items() if cells} == {
-        "hint": 1,
-        "answer": 1,
-        "check": 1,
-        "solution": 1,
-    }
+    assert (one.name, one.number, one.points) == ("one", "1.1", 3)
+    assert (two.name, two.number, two.points) == ("two", "1.2", 1)
+    assert {part for part, cells in one.parts.items() if cells} == {
+        "hint", "answer", "check", "solution",
+    }  # fmt: skip
     assert [cell.source for cell in two.parts["solution"]] == ["As."]
-    assert one.answers == ["x = 2"]
+    assert one.solution == "x = 2"
 
 
-def test_the_line_says_kind_level_minutes_and_points():
-    assert About(**ABOUT).line == "By hand · level 1 of 3 · 5 minutes · 1 point"
-    assert About("project", 2, 60, 4, "measure").line.endswith("60 minutes · 4 points")
+def test_without_its_solution_an_answer_is_what_stood_before_it():
+    cleared = notebook()
+    clear_solutions(cleared)
+    assert cleared.cells[2].source == "x = ...  # a number"
+    assert cleared.cells[3].source == "check.one(x)"
 
 
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        ({"kind": "riddle"}, "'riddle' is none of by hand"),
-        ({"level": 4}, "level 4"),
-        ({"points": 0}, "1 or more"),
-        ({"goal": ""}, "goal"),
-        ({"minute": 3}, "Exercise 1.1 has 'minute'"),
-    ],
-)
-def test_metadata_that_make_no_sense_are_refused(wrong, said):
-    source = notebook()
-    source.cells[0].metadata["nmpcrl"]["exercise"].update(wrong)
-    with pytest.raises(NoExercise, match=said):
-        list(exercises(source))
+def test_an_exercise_without_points_is_refused_with_its_first_words():
+    wrong = new_notebook(cells=[markdown("**Exercise 1.1.** How?", "exercise")])
+    with pytest.raises(NoExercise, match=r"'\*\*Exercise 1.1.\*\* How\?' does not begin with"):
+        list(exercises(wrong))
 
 
-def test_an_exercise_without_a_number_is_refused():
-    source = notebook()
-    source.cells[0].source = "How?"
-    with pytest.raises(NoExercise, match="does not begin with a label"):
-        list(exercises(source))
+@pytest.mark.parametrize("name", EXERCISED)
+def test_a_chapter_has_four_to_six_exercises_in_order_each_complete(name):
+    every = list(exercises(NOTEBOOKS[name]))
+    assert 4 <= len(every) <= 6
+    numbers = [tuple(map(int, one.number.split("."))) for one in every]
+    assert all(b == (a[0], a[1] + 1) for a, b in pairwise(numbers))
+    assert numbers[0][1] == 1
+    for one in every:
+        counts = {part: len(cells) for part, cells in one.parts.items()}
+        assert 1 <= counts["hint"] <= 3, one.number
+        assert counts["answer"] == counts["check"] == counts["solution"] == 1, one.number
+        assert one.solution, one.number
+        titles = ["Solution", *(f"Hint {k}" for k in range(1, counts["hint"] + 1))]
+        for cell, title in zip([*one.parts["solution"], *one.parts["hint"]], titles, strict=True):
+            assert cell.source.startswith(f"<details><summary>{title}</summary>\n\n")
+            assert cell.source.endswith("\n\n</details>")
 
 
-def test_a_solution_stands_in_for_the_answer_and_can_be_taken_back():
-    source = notebook()
-    answered = solved(source)
-    assert answered.cells[2].source == "x = 2"
-    answered.cells[3].outputs = [new_output("display_data", {"text/plain": "Right."})]
-    assert source.cells[2].source == "x = ..."  # a copy was solved
-    assert reopened(answered) == source
-
-
-def test_a_solution_has_code_for_each_answer():
-    source = notebook()
-    source.cells[4].source = "So it is 2."
-    with pytest.raises(ValueError, match="zip"):
-        solved(source)
+def test_every_tagged_question_is_found():
+    for name in EXERCISED:
+        tagged = [c for c in NOTEBOOKS[name].cells if "exercise" in tags_of(c)]
+        assert [one.text for one in exercises(NOTEBOOKS[name])] == tagged

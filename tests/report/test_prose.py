@@ -131,18 +131,6 @@ def test_say_displays_markdown(shown):
     assert shown(say, "It costs {cost:.1f}.", cost=2.0) == "It costs 2.0."
 
 
-def test_what_say_wrote_in_the_place_of_each_name_can_be_read_again():
-    cell = textwrap.dedent(
-        r"""
-        say("At $x_{max}$ it costs {cost:.1f}, {share}.", cost=cost, share=share)
-        say("And {more:.0%}", more=more)
-        """
-    )
-    texts = ["At $x_{max}$ it costs 2.5, one of\ntwo.", "And 31%"]
-    assert prose.said(cell, texts) == {"cost": "2.5", "share": "one of\ntwo", "more": "31%"}
-    assert prose.said(cell, ["Something else"]) == {}
-
-
 def test_source_displays_the_file_and_the_very_text_of_the_library(shown):
     text = shown(source, updates.td_error)
     assert text.startswith("`nmpcrl/learning/updates.py`\n\n```python\ndef td_error(")

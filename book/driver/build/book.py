@@ -14,10 +14,9 @@ Each build has its own place, in the last column, and six steps, each a function
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build, and so do verdicts, as `claims.reproduce` says.
               What the live figures solve with is compiled meanwhile
-4. `execute`  the chapters with papermill, the exercises solved, two at a time, into PLACE/executed
+4. `execute`  the chapters with papermill, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, exercises
-              unsolved, as `questions` says, the scripts of live figures, as `live` says, and
-              minutes and plans, as `teaching` says
+              unsolved, as `questions` says, and the scripts of live figures, as `live` says
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
               repaired for all readers, as `accessible` says
 

@@ -7,7 +7,6 @@ import nbformat
 
 from driver.page import enrich, live, pictures, questions
 from driver.project import notebooks
-from driver.teaching import teaching
 
 
 def dress(source: Path, executed: Iterable[Path]) -> None:
@@ -23,12 +22,11 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     live.add_runs(read.values(), shared)
     for path in source.glob("book/*.md"):
         text = pictures.beside(path.read_text("utf-8"), path.parent)
-        path.write_text(teaching.filled(enrich.page(text, output)))
+        path.write_text(enrich.page(text, output))
     for path, notebook in read.items():
         live.share(notebook, path, shared)
         download = path.name if path in executed else ""
         dressed = enrich.notebook(questions.placed(notebook), download)
-        teaching.headed(dressed, path.stem)
         for name, data in pictures.placed(dressed).items():
             (source / "book" / pictures.FOLDER / name).write_bytes(data)
         nbformat.write(dressed, source / path)

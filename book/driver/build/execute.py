@@ -1,4 +1,4 @@
-"""The chapters executed by papermill, the exercises solved, two at a time."""
+"""The chapters executed by papermill, two at a time."""
 
 import logging
 import os
@@ -21,13 +21,11 @@ from traitlets.config import Config
 from driver.build.chapters import Given
 from driver.page import enrich
 from driver.project import ROOT, Failure, shown
-from nmpcrl.course import exercises
 from nmpcrl.study.provenance import hash_of
 
 logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
 
 KERNEL = {  # the environment of what executes a chapter
-    "NMPCRL_STRICT": "1",  # a solution that its check refuses ends the build
     "NMPCRL_FIGURES_FOR_PAGE": "1",  # narrow, too, for telephones: `pictures`
     "NO_COLOR": "1",
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",
@@ -88,14 +86,13 @@ def execute(notebook: Path, target: Path, log: Path, given: Given) -> tuple[floa
     started = time.perf_counter()
     os.environ |= KERNEL
     target.parent.mkdir(parents=True, exist_ok=True)
-    source = solved(notebook, target.parent.parent / "solved")
     log.parent.mkdir(parents=True, exist_ok=True)
     os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
     problem = ""
     try:
         with sockets() as kernels:
             papermill.execute_notebook(
-                str(source),
+                str(notebook),
                 str(target),
                 parameters=given,
                 kernel_name="python3",
@@ -120,13 +117,6 @@ def sockets() -> Iterator[Config]:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as place:
         files = {"transport": "ipc", "ip": f"{place}/kernel"}
         yield Config() if os.name == "nt" else Config({"KernelManager": files})
-
-
-def solved(notebook: Path, folder: Path) -> Path:
-    """Write a notebook with the answers of its solutions, so that a wrong solution ends a build."""
-    folder.mkdir(parents=True, exist_ok=True)
-    nbformat.write(exercises.solved(nbformat.read(notebook, 4)), folder / notebook.name)
-    return folder / notebook.name
 
 
 def sentence(error: Exception) -> str:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import nbformat
 
-from driver.page import accessible, enrich, pictures
+from driver.page import accessible, enrich, pictures, questions
 from driver.project import ROOT, Failure, from_yaml, pages, shown
-from nmpcrl.course import exercises
 
 MOVED = {  # addresses of pages that are no more
     "book/api": "api_control.html",
@@ -21,6 +20,7 @@ MOVED = {  # addresses of pages that are no more
     ),
     "book/cluster": "reproduce.html#reproduce-cluster",
     "book/letter": "departures.html#departures-questions",
+    "book/learn_alone": "teach.html#teach-alone",
 }
 ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">
@@ -52,7 +52,7 @@ def render(place: Path, strict: bool) -> None:
     if result.returncode:
         raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
     for path in (place / "executed").glob("*.ipynb"):
-        notebook = pictures.plain(enrich.download(exercises.reopened(nbformat.read(path, 4))))
+        notebook = pictures.plain(enrich.download(questions.opened(nbformat.read(path, 4))))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
     accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")

@@ -1,1 +1,1 @@
-"""Editions of the chapters for students, teachers and graders, and their slides."""
+"""Editions of the chapters for a course, and their slides."""

@@ -1,9 +1,9 @@
 """Exercises on the pages: a place to type an answer, and what checks it there.
 
-An executed chapter has the solutions in the place of its answers, and each check has displayed what
-the page needs to check the same answer (`nmpcrl.course.outcome.MIME`). The page shows the empty
-answer and, where it can be typed, a hidden place that `book/_static/exercises` makes usable;
-without scripts and on paper there are the question, its code and the folded solution.
+An executed chapter has solved its exercises, and each check has displayed what the page needs to
+check the same answer (`nmpcrl.course.outcome.MIME`). The page shows the empty answer, the solution
+in a fold and, where an answer can be typed, a hidden place that `book/_static/exercises.js` makes
+usable; without scripts and on paper there are the question, its code and the folded solution.
 """
 
 import json
@@ -11,24 +11,36 @@ from typing import Any
 
 from nbformat.v4 import new_markdown_cell
 
-from nmpcrl.course.exercises import HEAD, Exercise, exercises, reopened
+from nmpcrl.course.exercises import Exercise, clear_solutions, exercises
 from nmpcrl.course.outcome import MIME
 
 PLACE = (
     '<div class="answer" data-exercise="{name}" data-number="{number}" hidden>'
     '<script type="application/json">{data}</script></div>'
 )
-LINE = '<p class="exercise-line">{}</p>'
+END = "\n\n</details>"  # of a solution
 
 
-def placed(executed: Any) -> Any:
+def placed(notebook: Any) -> Any:
     """An executed notebook with empty answers and, below each that can be typed, its place."""
-    known = {one.name: check for one in exercises(executed) if (check := _checked(one))}
-    notebook = reopened(executed)
+    every = list(exercises(notebook))
+    known = {one.name: _checked(one) for one in every}
+    for one in every:
+        for cell in one.parts["solution"]:
+            code = f"\n\n```python\n{one.solution}\n```{END}"
+            cell.source = cell.source.removesuffix(END) + code
+    opened(notebook)
+    for one in every:
+        _join(notebook, one, known[one.name])
+    return notebook
+
+
+def opened(notebook: Any) -> Any:
+    """A notebook with empty answers, and checks that say nothing."""
     for one in exercises(notebook):
-        line = LINE.format(one.about.line)
-        one.text.source = HEAD.sub(rf"\g<0>{line}\n\n", one.text.source)
-        _join(notebook, one, known.get(one.name))
+        for cell in one.parts["answer"] + one.parts["check"]:
+            cell.outputs = []
+    clear_solutions(notebook)
     return notebook
 
 
@@ -40,8 +52,6 @@ def _checked(exercise: Exercise) -> dict[str, Any] | None:
 
 def _join(notebook: Any, exercise: Exercise, known: dict[str, Any] | None) -> None:
     """Answer and check become one cell, folded where the answer can be typed."""
-    if not exercise.parts["answer"]:
-        return
     *others, last = exercise.parts["answer"] + exercise.parts["check"]
     last.source = "\n\n".join(cell.source for cell in [*others, last])
     dropped = {cell.id for cell in others}

@@ -1,27 +1,23 @@
 """The exercises of Chapter 7."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
-from nmpcrl.course.checks.precision import to_digits
+from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.learning.updates import (
-    OVERSHOOT,
     auxiliary_step,
     curvature_correction,
     gradient_td_step,
 )
 
 
-@varied(w=(0.02, 0.08, 0.01))
-@exercise
-def correction(answer: Any, *, w: float = 0.1) -> Outcome:
+def correction(answer: Any) -> Outcome:
     """h for Q = theta^2 x at theta = 2, x = 1 and delta = 1."""
+    w = 0.1
     phi, hessian, along = 2 * 2.0, 2.0, np.array([w])
     h = float(curvature_correction(1.0, np.array([phi]), along, hessian * along)[0])
     return number(
@@ -37,60 +33,6 @@ def correction(answer: Any, *, w: float = 0.1) -> Outcome:
     )
 
 
-@varied(millions=(4.4, 9.6, 0.2))
-@exercise
-def fast(answer: Any, *, millions: float = 3.8) -> Outcome:
-    """The largest beta with which beta |phi|^2 does not overshoot, at the largest |phi|^2."""
-    largest = 4 * millions * 1e6
-    beta = OVERSHOOT / largest
-    return number(
-        answer,
-        beta,
-        tolerance=to_digits(beta, 2, least=0.05),
-        mistakes={
-            OVERSHOOT
-            / (millions * 1e6): "It has to hold at the end, too, where the norm is larger.",
-            1 / largest: "At most 2, not 1: a step of 2 still does not grow.",
-            OVERSHOOT / (4 * largest): "The squared norm grows fourfold, not the norm.",
-        },
-    )
-
-
-@varied(final=(3710, 3990, 20))  # at 3800 as much is left to gain as was gained
-@exercise
-def share(answer: Any, *, final: float = 3700) -> Outcome:
-    """What was gained over what could be gained."""
-    initial, best = 4000.0, 3600.0
-    return number(
-        answer,
-        (initial - final) / (initial - best),
-        tolerance=0.01,
-        mistakes={
-            (initial - final) / initial: "That is the share of the cost, not of what is possible.",
-            (final - best) / (initial - best): "That is what is left to gain.",
-        },
-    )
-
-
-@exercise
-def kappa(answer: Any) -> Outcome:
-    """The concave function of Eq. (7.1) at kappa times its maximiser, over its maximum."""
-    return formula(
-        answer,
-        lambda kappa: 2 * kappa - kappa**2,
-        {"kappa": (0, 2)},
-        mistakes={
-            "The second term has w squared.": lambda kappa: kappa,
-            "That is of the first term; the maximum is half as large.": (
-                lambda kappa: kappa - kappa**2 / 2
-            ),
-            "That is the share of the second term alone.": lambda kappa: kappa**2,
-            "That is what is lost.": lambda kappa: (1 - kappa) ** 2,
-        },
-    )
-
-
-@exercise
 def matched(answer: Any) -> Outcome:
     """What a control with the same lengths and other directions rules out."""
     return choice(
@@ -105,7 +47,6 @@ def matched(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def tdc(answer: Any) -> Outcome:
     """One update of exact TDC with random features and a random symmetric Hessian."""
 
@@ -148,7 +89,6 @@ def tdc(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def product(answer: Any) -> Outcome:
     """Gradients of random quartics, and vectors of any length, zero among them."""
 
@@ -171,71 +111,3 @@ def product(answer: Any) -> Outcome:
 def _features(matrix: Vector, cubic: Vector, theta: Vector) -> Vector:
     """The gradient of a quartic; it bends differently in each component."""
     return matrix @ theta + cubic * theta**3
-
-
-@exercise
-def search(answer: Any) -> Outcome:
-    """Fresh draws in every round, the same ones for the same seed, and never a worse result."""
-
-    def draw(rng: np.random.Generator) -> dict[str, Any]:
-        start = rng.uniform(2, 3, rng.integers(3, 10))
-        return {
-            "start": start,
-            "rounds": int(rng.integers(5, 15)),
-            "seed": int(rng.integers(10**6)),
-        }
-
-    def seen(answer: Any, start: Vector, rounds: int, seed: int) -> dict[str, Any]:
-        def searched(cost: Callable[[Vector], float], seed: int = seed) -> _Search:
-            tried: list[Vector] = []
-
-            def watched(theta: Vector) -> float:
-                tried.append(np.array(theta, float))
-                return cost(theta)
-
-            return _Search(cost, np.asarray(answer(watched, start, rounds, seed)), tried)
-
-        flat = searched(lambda theta: float(not np.array_equal(theta, start)))
-        bowls = [
-            searched(lambda theta: float(theta @ theta), one) for one in (seed, seed, seed + 1)
-        ]
-        slope = searched(lambda theta: float(theta.sum()))
-        rugged = searched(lambda theta: float(np.sin(1e4 * theta).sum()))  # no way leads down
-        steps = np.array([start, *flat.tried]) - start
-        return {
-            "Every round draws the same steps.": (
-                len(set(map(tuple, flat.tried))) > 8 * (rounds - 1)
-            ),
-            "The same seed has to give the same result, and another seed another one.": (
-                np.array_equal(bowls[0].end, bowls[1].end)
-                and not np.array_equal(bowls[0].end, bowls[2].end)
-            ),
-            "It met something better on its way than what it returns: keep the best.": (
-                np.array_equal(flat.end, start) and all(one.best for one in [*bowls, slope, rugged])
-            ),
-            "What it returns is worse than the start.": all(
-                one.cost(one.end) <= one.cost(start) for one in bowls
-            ),
-            "A step is the same in all components: draw one number for each.": (
-                np.ptp(steps, axis=1).max() > 1e-9
-            ),
-            "All that it draws is near the start: draw around the best so far.": (
-                (slope.end - start).sum() < steps.sum(axis=1).min() - 1e-9
-            ),
-        }
-
-    return behaves(answer, seen, draw)
-
-
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """What a search did with a cost."""
-
-    cost: Callable[[Vector], float]
-    end: Vector
-    tried: list[Vector]
-
-    @property
-    def best(self) -> bool:
-        """Whether nothing that was tried costs less than what was returned."""
-        return self.cost(self.end) <= min(map(self.cost, self.tried), default=np.inf)

@@ -5,44 +5,11 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+from nmpcrl.course import Outcome, choice, function, number
 
 RADIUS = 1.25  # of an obstacle and the robot together [m]
 
 
-@varied(steps=(11, 19, 1))
-@exercise
-def ahead(answer: Any, *, steps: float = 10) -> Outcome:
-    """Where an obstacle at y = 1.0, before at 0.8, is taken to be."""
-    now, before = 1.0, 0.8
-    return number(
-        answer,
-        now + steps * (now - before),
-        tolerance=0.001,
-        unit="m",
-        mistakes={
-            now + (now - before): "That is one step ahead.",
-            now - steps * (now - before): "It moves up: now minus before, not before minus now.",
-            now + 0.2 * steps * (now - before): "0.2 m is what it moves in a step already.",
-        },
-    )
-
-
-@exercise
-def lag(answer: Any) -> Outcome:
-    """How far a frozen view errs at the end of a plan of N steps of T seconds."""
-    return formula(
-        answer,
-        lambda N, T, v: N * T * v,
-        {"N": (2, 40), "T": (0.05, 0.5), "v": (0.05, 1)},
-        mistakes={
-            "That is one step; a plan has N of them.": lambda N, T, v: T * v,
-            "v is in metres a second, and a step has T of these.": lambda N, T, v: N * v,
-        },
-    )
-
-
-@exercise
 def clocked(answer: Any) -> Outcome:
     """The TD error whose target is of the next time."""
     cost, gamma, value, later, same = 20.0, 0.97, 900.0, 880.0, 910.0
@@ -58,7 +25,6 @@ def clocked(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def blind(answer: Any) -> Outcome:
     """What a Q-network of state and action misses among obstacles that move."""
     return choice(
@@ -80,7 +46,6 @@ def foretold(before: Matrix, now: Matrix, horizon: int) -> Matrix:
     return centres
 
 
-@exercise
 def predictor(answer: Any) -> Outcome:
     """Extrapolate the centres of some obstacles over a plan."""
 
@@ -120,7 +85,6 @@ def met_twice(states: Matrix, centres: Matrix) -> int:
     return int((away < RADIUS).sum())
 
 
-@exercise
 def inside(answer: Any) -> Outcome:
     """Count the states of an episode that are in an obstacle."""
 

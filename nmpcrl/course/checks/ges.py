@@ -1,23 +1,19 @@
 """The exercises of Chapter 4."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.two_state import Chain, expected_matrix
-from nmpcrl.course import Outcome, choice, exercise, function, number, varied
-from nmpcrl.course.checks.precision import to_digits
+from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.learning.learners import semi_gradient
-from nmpcrl.learning.updates import curvature_correction, gradient_td_step
-from nmpcrl.study import paper
+from nmpcrl.learning.updates import gradient_td_step
 
 
-@varied(gamma=(0.1, 0.35, 0.01))
-@exercise
-def factor(answer: Any, *, gamma: float = 0.4) -> Outcome:
+def factor(answer: Any) -> Outcome:
     """By which one expected semi-gradient step multiplies theta."""
+    gamma = 0.4
     chain, step = Chain(gamma=gamma), 0.1
     return number(
         answer,
@@ -32,10 +28,9 @@ def factor(answer: Any, *, gamma: float = 0.4) -> Outcome:
     )
 
 
-@varied(gamma=(0.6, 0.88, 0.02))
-@exercise
-def ratio(answer: Any, *, gamma: float = 0.9) -> Outcome:
+def ratio(answer: Any) -> Outcome:
     """Where the trace of the matrix changes its sign, for a tiny alpha."""
+    gamma = 0.9
     return number(
         answer,
         2 * gamma - 1,
@@ -46,23 +41,6 @@ def ratio(answer: Any, *, gamma: float = 0.9) -> Outcome:
     )
 
 
-@varied(kappa=(0.6, 0.88, 0.02))
-@exercise
-def parallel(answer: Any, *, kappa: float = 0.9) -> Outcome:
-    """1 - gamma kappa."""
-    return number(
-        answer,
-        1 - paper.GAMMA * kappa,
-        tolerance=to_digits(1 - paper.GAMMA * kappa, 3),
-        mistakes={
-            1 - kappa: "The correction has a factor of gamma, too.",
-            paper.GAMMA * kappa: "That is the length of the correction; what is left of ES?",
-            1 / (1 - paper.GAMMA * kappa): "That is how much longer ES is: take the inverse.",
-        },
-    )
-
-
-@exercise
 def diagnosis(answer: Any) -> Outcome:
     """What two numbers of a run of ES say of its divergence."""
     return choice(
@@ -84,7 +62,6 @@ def _transition(rng: np.random.Generator) -> dict[str, Any]:
     return vectors | {"alpha": float(rng.uniform(0.01, 0.1)), "gamma": float(rng.uniform(0.5, 1))}
 
 
-@exercise
 def gtd2_step(answer: Any) -> Outcome:
     """GTD2 (Sutton et al. 2009): the first expression of Eq. (4.4), sampled."""
     return function(
@@ -114,64 +91,6 @@ def gtd2_step(answer: Any) -> Outcome:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Cubic:
-    """The gradient of b'theta + theta'H theta / 2 + (c'theta)^3 / 3."""
-
-    b: Vector
-    c: Vector
-    H: Matrix  # symmetric
-
-    def __call__(self, theta: Vector) -> Vector:
-        result: Vector = self.b + self.H @ theta + (self.c @ theta) ** 2 * self.c
-        return result
-
-    def hessian(self, theta: Vector) -> Matrix:
-        """The value's second derivative."""
-        result: Matrix = self.H + 2 * (self.c @ theta) * np.outer(self.c, self.c)
-        return result
-
-
-@exercise
-def correction(answer: Any) -> Outcome:
-    """h of Eq. (4.10), with the Hessian's product from two further gradients."""
-
-    def draw(rng: np.random.Generator) -> dict[str, Any]:
-        d = int(rng.integers(2, 6))
-        theta, w, b, c = rng.normal(size=(4, d))
-        H = rng.normal(size=(d, d))
-        case = {"delta": float(rng.normal()), "w": w, "theta": theta}
-        return case | {"features": Cubic(b, c, H + H.T), "step": 1e-3}
-
-    def right(delta: float, w: Vector, theta: Vector, features: Cubic, step: float) -> Vector:
-        return curvature_correction(delta, features(theta), w, features.hessian(theta) @ w)
-
-    def forward(delta: float, w: Vector, theta: Vector, features: Cubic, step: float) -> Vector:
-        moved = (features(theta + step * w) - features(theta)) / step
-        return curvature_correction(delta, features(theta), w, moved)
-
-    return function(
-        answer,
-        right,
-        draw,
-        tolerance=1e-7,
-        mistakes={
-            "The difference is between two points that are 2 step apart.": (
-                lambda **case: 2 * right(**case)
-            ),
-            "That is a forward difference, with an error of the order of step: take one point on "
-            "either side.": forward,
-            "The first factor is delta - phi'w, what w leaves of the TD error.": (
-                lambda delta, w, theta, features, step: delta * features.hessian(theta) @ w
-            ),
-            "That is the Hessian times w; a factor is missing.": (
-                lambda delta, w, theta, features, step: features.hessian(theta) @ w
-            ),
-        },
-    )
-
-
-@exercise
 def direction(answer: Any) -> Outcome:
     """Half the negative gradient of the mean-square projected Bellman error of a batch."""
 

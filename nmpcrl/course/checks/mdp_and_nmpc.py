@@ -4,17 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from nmpcrl.control import Nmpc
 from nmpcrl.control.task import overlap
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.course.checks.precision import to_places
 from nmpcrl.study import paper
 
 
-@varied(theta_c=(0.3, 0.9, 0.05))
-@exercise
-def distance(answer: Any, *, theta_c: float = 0.21) -> Outcome:
+def distance(answer: Any) -> Outcome:
     """Where the overlap, Eq. (1.4), is minus theta_c."""
+    theta_c = 0.21
     radius = 2.5 / 2
     kept = radius * float(np.sqrt(1 + theta_c))
     return number(
@@ -33,10 +31,9 @@ def distance(answer: Any, *, theta_c: float = 0.21) -> Outcome:
     )
 
 
-@exercise
-def scale(answer: Any, nmpc: Nmpc) -> Outcome:
+def scale(answer: Any) -> Outcome:
     """How much larger the value at the start is with twice the weights, from two solves."""
-    theta = np.array(paper.THETA_INIT)
+    nmpc, theta = paper.nmpc(), np.array(paper.THETA_INIT)
     doubled = np.append(2 * theta[:8], theta[8])
     values = [nmpc.solve(nmpc.task.start, one).value for one in (theta, doubled)]
     return number(
@@ -51,21 +48,6 @@ def scale(answer: Any, nmpc: Nmpc) -> Outcome:
     )
 
 
-@exercise
-def reach(answer: Any) -> Outcome:
-    """Steps times seconds times the top speed."""
-    return formula(
-        answer,
-        lambda N: 0.6 * 0.2 * N,
-        {"N": (2, 20)},
-        mistakes={
-            "That is how many seconds the plan lasts; at which speed?": lambda N: 0.2 * N,
-            "That is a speed times a number of steps; how long is a step?": lambda N: 0.6 * N,
-        },
-    )
-
-
-@exercise
 def apart(answer: Any) -> Outcome:
     """Why the plan is not the closed loop although the model is exact."""
     return choice(
@@ -81,7 +63,6 @@ def apart(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def penalty(answer: Any) -> Outcome:
     """Eq. (1.5), the part on obstacles, among some that are so close that several are charged."""
     task = paper.task()
@@ -119,7 +100,6 @@ def penalty(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def discounted(answer: Any) -> Outcome:
     """The sum of gamma^k times the cost of step k, from k = 0."""
 

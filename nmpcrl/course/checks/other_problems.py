@@ -5,28 +5,10 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.course.checks.precision import to_digits
 
 
-@varied(delta=(3.0, 6.0, 0.5))
-@exercise
-def moved(answer: Any, *, delta: float = 2.0) -> Outcome:
-    """By how much a normalised step moves Q, to first order: 0.05 delta."""
-    return number(
-        answer,
-        0.05 * delta,
-        tolerance=0.01,
-        mistakes={
-            0.05 * delta * 4: "The step is divided by the squared norm of phi.",
-            0.05 * delta / 4: "The change of Q is phi times the step: phi comes twice.",
-            delta: "Only the twentieth part of the error is closed.",
-            0.05 * delta / 2: "The norm is squared in the denominator, as it is in phi'phi.",
-        },
-    )
-
-
-@exercise
 def factor(answer: Any) -> Outcome:
     """What a difference is multiplied by in each step, from 1e-10 to 1e-3 in 100 steps."""
     grown = 10 ** (7 / 100)
@@ -42,7 +24,6 @@ def factor(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def single(answer: Any) -> Outcome:
     """What a stored result of a single seed can promise."""
     return choice(
@@ -57,7 +38,6 @@ def single(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def gain(answer: Any) -> Outcome:
     """One step of Riccati's recursion with random matrices: K, and then P."""
 
@@ -95,7 +75,6 @@ def riccati_step(
     return K, Q + K.T @ R @ K + gamma * closed.T @ P @ closed
 
 
-@exercise
 def newton(answer: Any) -> Outcome:
     """A regularised step of Gauss and Newton of a batch, with its mean statistics."""
 

@@ -5,15 +5,14 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.course.checks.precision import to_digits
 from nmpcrl.study import paper
 
 
-@varied(high=(1500, 2400, 50))
-@exercise
-def floor(answer: Any, *, high: float = 1400) -> Outcome:
+def floor(answer: Any) -> Outcome:
     """The standard deviation of one example at 1000 and three that are higher."""
+    high = 1400
     values = np.array([1000.0, high, high, high])
     errors = values - values.mean()
     least = float(np.sqrt(np.mean(errors**2)))
@@ -32,10 +31,9 @@ def floor(answer: Any, *, high: float = 1400) -> Outcome:
     )
 
 
-@varied(error=(25, 43, 1))  # from 44 on, two digits do not show gamma
-@exercise
-def astray(answer: Any, *, error: float = 20) -> Outcome:
+def astray(answer: Any) -> Outcome:
     """alpha times gamma times the error times phi_x, once in each step of an episode."""
+    error = 20
     phi = 1800.0
     step = paper.ALPHA * paper.GAMMA * error * phi
     whole = paper.STEPS * step
@@ -53,43 +51,21 @@ def astray(answer: Any, *, error: float = 20) -> Outcome:
     )
 
 
-@varied(part=(0.65, 0.9, 0.05))
-@exercise
-def share(answer: Any, *, part: float = 0.6) -> Outcome:
-    """The share r with (1 + r) / 2 = part."""
-    return number(
-        answer,
-        2 * part - 1,
-        mistakes={
-            2 * part: "A step of RDES has a solve as well: one solve and a fit, against two.",
-            part - 0.5: f"A step of ES takes two solves: {part} of it is {2 * part:g} solves.",
-        },
-    )
-
-
-@exercise
 def tail(answer: Any) -> Outcome:
     """The TD error with (V - L) / gamma for the next value: V and gamma cancel."""
-    return formula(
+    cost, first, value, gamma = 22.0, 15.0, 1400.0, paper.GAMMA
+    return number(
         answer,
-        lambda ell, L, V, gamma: ell - L,
-        {"ell": (5, 50), "L": (5, 50), "V": (500, 1500), "gamma": (0.9, 0.99)},
+        cost - first,
         mistakes={
-            "V counts the plan from now on: what remains of it after the first stage is "
-            "discounted once, so divide by gamma.": (
-                lambda ell, L, V, gamma: ell + gamma * (V - L) - V
-            ),
-            "That is the next value; put it into the TD error.": (
-                lambda ell, L, V, gamma: (V - L) / gamma
-            ),
-            "Look at the sign: the TD error is the target minus the value.": (
-                lambda ell, L, V, gamma: L - ell
-            ),
+            cost + gamma * (value - first) - value: "V counts the plan from now on: what remains "
+            "of it after the first stage is discounted once, so divide by gamma.",
+            (value - first) / gamma: "That is the next value; put it into the TD error.",
+            first - cost: "Look at the sign: the TD error is the target minus the value.",
         },
     )
 
 
-@exercise
 def split(answer: Any) -> Outcome:
     """Which held-out steps are as far from the examples as those met while learning."""
     return choice(
@@ -106,41 +82,6 @@ def split(answer: Any) -> Outcome:
     )
 
 
-@exercise
-def systematic(answer: Any) -> Outcome:
-    """The absolute mean of the known errors over their root mean square."""
-
-    def draw(rng: np.random.Generator) -> dict[str, Any]:
-        error = rng.normal(rng.uniform(-20, 20), rng.uniform(1, 20), rng.integers(20, 130))
-        error[rng.choice(len(error), 5, replace=False)] = np.nan
-        return {"error": error}
-
-    def ratio(error: Vector) -> float:
-        known = error[np.isfinite(error)]
-        return float(abs(known.mean()) / np.sqrt(np.mean(known**2)))
-
-    return function(
-        answer,
-        ratio,
-        draw,
-        mistakes={
-            "One unknown error makes everything unknown: leave those out that are nan.": (
-                lambda error: np.nan
-            ),
-            "The mean has a sign, and a share has none: take its absolute value.": (
-                lambda error: np.nanmean(error) / np.sqrt(np.nanmean(error**2))
-            ),
-            "An error that is always the same has no deviation, and should give 1: divide by the "
-            "root of the mean square.": lambda error: abs(np.nanmean(error)) / np.nanstd(error),
-            "The mean of absolute values does not know whether errors cancel: take the absolute "
-            "value of the mean.": (
-                lambda error: np.nanmean(np.abs(error)) / np.sqrt(np.nanmean(error**2))
-            ),
-        },
-    )
-
-
-@exercise
 def examples(answer: Any) -> Outcome:
     """Inputs of the network with the theta that each value was solved with."""
 

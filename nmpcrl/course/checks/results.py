@@ -6,15 +6,11 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.bench import learners
 from nmpcrl.claims import rule
 from nmpcrl.claims.verdict import REPRODUCED
-from nmpcrl.course import Outcome, choice, exercise, function, number, varied
-from nmpcrl.course.checks.precision import to_digits
-from nmpcrl.study import paper
+from nmpcrl.course import Outcome, choice, function, number
 
 
-@exercise
 def enough(answer: Any) -> Outcome:
     """The least number of runs that the rule calls reproduced if all of them agree."""
     return number(
@@ -29,7 +25,6 @@ def enough(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def missing(answer: Any) -> Outcome:
     """The most of twenty that may be missing if the others say yes."""
     asked = 20
@@ -46,41 +41,6 @@ def missing(answer: Any) -> Outcome:
     )
 
 
-@varied(worst=(45, 100, 1))
-@exercise
-def mean(answer: Any, *, worst: float = 40) -> Outcome:
-    """Of nineteen ones and one that is far larger."""
-    late = np.array([1.0] * 19 + [worst])
-    return number(
-        answer,
-        float(late.mean()),
-        tolerance=2e-3,
-        mistakes={
-            1.0: "That is the median, which forgives the one episode.",
-            worst / 20: "The other 19 episodes count, too.",
-            worst: "That is the largest of the 20.",
-        },
-    )
-
-
-@exercise
-def step(answer: Any) -> Outcome:
-    """The paper's hours over all steps [s]."""
-    seconds = learners.PAPER_HOURS["RDES"] * 3600 / (paper.EPISODES * paper.STEPS)
-    return number(
-        answer,
-        seconds,
-        unit="s",
-        tolerance=to_digits(seconds, 2, least=0.01),
-        mistakes={
-            seconds / 60: "An hour has 3600 seconds.",
-            2 * seconds: "Table II gives 18 hours for ES and 9 for RDES.",
-            seconds * paper.STEPS: "That is the time of an episode; how long is a step?",
-        },
-    )
-
-
-@exercise
 def fall(answer: Any) -> Outcome:
     """What a training cost, a frozen arm's and a rollout without noise say together."""
     return choice(
@@ -96,7 +56,6 @@ def fall(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def drawdown(answer: Any) -> Outcome:
     """The largest rise above the lowest cost so far, of random curves, some with failures."""
 
@@ -127,7 +86,6 @@ def drawdown(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def pairs(answer: Any) -> Outcome:
     """Ratios of runs and their frozen arms, in tables of different order."""
 

@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc
-from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
+from nmpcrl.course import Outcome, behaves, choice, function, number
 from nmpcrl.course.checks.precision import to_digits
 
 
-@varied(weight=(90, 200, 5))
-@exercise
-def price(answer: Any, *, weight: float = 80) -> Outcome:
+def price(answer: Any) -> Outcome:
     """Half of W: sigma and s are equal where h = 0."""
+    weight = 80
     return number(
         answer,
         weight / 2,
@@ -27,7 +25,6 @@ def price(answer: Any, *, weight: float = 80) -> Outcome:
     )
 
 
-@exercise
 def golden(answer: Any) -> Outcome:
     """The fixed point of V = 1 + V - V^2 / (1 + V)."""
     limit = (1 + 5**0.5) / 2
@@ -43,42 +40,6 @@ def golden(answer: Any) -> Outcome:
     )
 
 
-@exercise
-def dense(answer: Any, nmpc: Nmpc) -> Outcome:
-    """The cube of how many times larger the matrix is with 80 steps than with 40."""
-    n, m, discs = nmpc.plant.n, nmpc.plant.m, len(nmpc.task.obstacles)
-    per_stage, rest = n + m + discs + n + discs, 2 * n + 2 * discs
-    sizes = [per_stage * steps + rest for steps in (40, 80)]
-    grows = sizes[1] / sizes[0]
-    return number(
-        answer,
-        grows**3,
-        tolerance=0.05,
-        mistakes={
-            2.0: "That is the factor of the recursion, which does the same work at every stage.",
-            4.0: "So much more room the matrix takes; the work grows faster.",
-        },
-    )
-
-
-@varied(edge=(4, 9, 1))
-@exercise
-def exact(answer: Any, *, edge: float = 3) -> Outcome:
-    """The minimiser of x^2 + W max(0, edge - x)."""
-    beyond = f"For a large W that lies beyond {edge}, where nothing is charged any more."
-    return formula(
-        answer,
-        lambda W: min(W / 2, edge),
-        {"W": (1, 4 * edge)},
-        mistakes={
-            "For a small W it pays to violate the constraint.": lambda W: edge,
-            beyond: lambda W: W / 2,
-            "That is how much of the constraint is violated.": lambda W: max(edge - W / 2, 0.0),
-        },
-    )
-
-
-@exercise
 def values(answer: Any) -> Outcome:
     """What two small residuals at two values say."""
     return choice(
@@ -93,7 +54,6 @@ def values(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def riccati(answer: Any) -> Outcome:
     """The first gain of random problems, beside a dense solve of the whole plan."""
 
@@ -136,7 +96,6 @@ def _first_gain_by_one_solve(
     return plan[:m]
 
 
-@exercise
 def residual(answer: Any) -> Outcome:
     """Points that satisfy all KKT conditions, and points that miss one of them.
 

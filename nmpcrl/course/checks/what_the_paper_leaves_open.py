@@ -6,17 +6,13 @@ import numpy as np
 from scipy.stats import fisher_exact
 
 from nmpcrl import Vector
-from nmpcrl.claims.rule import read
-from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.course.checks.precision import to_places
 
-RADIUS = 2.5 / 2  # [m] of the circle on which the overlap is 0
 
-
-@varied(apart=(2.9, 3.6, 0.05))
-@exercise
-def gap(answer: Any, *, apart: float = 2.8) -> Outcome:
+def gap(answer: Any) -> Outcome:
     """The theta_c at which the circles around two centres touch."""
+    apart = 2.8
     closes = (apart / 2.5) ** 2 - 1
     return number(
         answer,
@@ -30,45 +26,9 @@ def gap(answer: Any, *, apart: float = 2.8) -> Outcome:
     )
 
 
-@exercise
-def metres(answer: Any) -> Outcome:
-    """The margin of the overlap that is 0.35 m wide."""
-    printed = 0.35
-    margin = (1 + printed / RADIUS) ** 2 - 1
-    return number(
-        answer,
-        margin,
-        tolerance=to_places(margin, 2, least=0.01),
-        mistakes={
-            printed / RADIUS: "The overlap has the square of the distance.",
-            (1 + printed / (2 * RADIUS)) ** 2 - 1: "The circle's radius is 1.25 m, half of 2.5 m.",
-            (1 + printed / RADIUS) ** 2: "That is 1 + d_o.",
-            printed: "That is what is printed: with it the charge begins 1.45 m from a centre, and"
-            " not 1.25 + 0.35 = 1.60 m.",
-        },
-    )
-
-
-@exercise
-def fisher(answer: Any) -> Outcome:
-    """Of five runs with and five without, all unlike."""
-    p = float(fisher_exact([[5, 0], [0, 5]]).pvalue)
-    return number(
-        answer,
-        p,
-        tolerance=to_places(p, 4, least=0.01),
-        mistakes={
-            p / 2: "The test has two sides: the opposite table is as extreme as this one.",
-            2 / 70: "That is for four runs on each side.",
-            2 / 32: "The runs of one row are drawn from all ten: use a binomial coefficient.",
-        },
-    )
-
-
-@varied(cells=(20, 110, 5))
-@exercise
-def smallest(answer: Any, *, cells: int = 120) -> Outcome:
+def smallest(answer: Any) -> Outcome:
     """That at least one of many cells has a small p."""
+    cells = 120
     small = 0.01
     some = 1 - (1 - small) ** cells
     return number(
@@ -83,23 +43,6 @@ def smallest(answer: Any, *, cells: int = 120) -> Outcome:
     )
 
 
-@exercise
-def border(answer: Any) -> Outcome:
-    """The verdicts on 9 of 10 and on 8 of 10."""
-    verdicts = f"{read(9, 10)}, {read(8, 10)}"
-    return choice(
-        answer,
-        "b",
-        {
-            "a": "With 8 of 10 the lower end of the interval is below one half.",
-            "b": f"{verdicts}.",
-            "c": "9 of 10 is nine tenths, and its interval lies above one half.",
-            "d": "Ten runs suffice for a verdict; with three they would not.",
-        },
-    )
-
-
-@exercise
 def screen(answer: Any) -> Outcome:
     """A criterion that asks the question of the claim."""
     return choice(
@@ -116,7 +59,6 @@ def screen(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def paired(answer: Any) -> Outcome:
     """McNemar's exact test of random answers, some of which do not change at all."""
 
@@ -152,7 +94,6 @@ def paired(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def best(answer: Any) -> Outcome:
     """The smallest p of several borders, and what the search for it costs."""
 

@@ -5,14 +5,13 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, behaves, choice, exercise, function, number, varied
-from nmpcrl.course.checks.precision import to_digits, to_places
+from nmpcrl.course import Outcome, behaves, choice, function, number
+from nmpcrl.course.checks.precision import to_digits
 
 
-@varied(times=(3.0, 7.5, 0.5))
-@exercise
-def guarded(answer: Any, *, times: float = 8.0) -> Outcome:
+def guarded(answer: Any) -> Outcome:
     """The share of a step that the guard leaves, where alpha ||phi||^2 is `times`."""
+    times = 8.0
     return number(
         answer,
         1 / times,
@@ -25,25 +24,6 @@ def guarded(answer: Any, *, times: float = 8.0) -> Outcome:
     )
 
 
-@exercise
-def middle(answer: Any) -> Outcome:
-    """The interquartile mean of eight shares."""
-    middle = (0.8 + 0.7 + 0.6 + 0.2) / 4
-    return number(
-        answer,
-        middle,
-        tolerance=to_places(middle, 3, least=0.001),
-        mistakes={
-            -28 / 8: "That is the mean of all; the interquartile mean leaves out a quarter on each"
-            " side.",
-            0.65: "That is the median.",
-            (-2 + 0.2 + 0.6 + 0.7 + 0.8 + 0.8) / 6: "A quarter of eight values is two, on each"
-            " side.",
-        },
-    )
-
-
-@exercise
 def advised(answer: Any) -> Outcome:
     """Which of four entries the rule of advice names first."""
     return choice(
@@ -59,7 +39,6 @@ def advised(answer: Any) -> Outcome:
     )
 
 
-@exercise
 def tdrc(answer: Any) -> Outcome:
     """One step of TDRC, theta and w from the old values."""
 
@@ -105,7 +84,6 @@ def tdrc_step(
     return moved, w + alpha * ((delta - phi @ w) * phi - kappa * w)
 
 
-@exercise
 def undone(answer: Any) -> Outcome:
     """Each move that costs more than the least so far is taken back, and the others are kept."""
 
