@@ -24,6 +24,12 @@ pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a 
 course: .venv/ready  ## Notebooks for students and teachers, and slides of the built book, in _build/course
 	@$(BIN)/python book/course.py
 
+# One rule a chapter, by which book/build.py has them executed, on all cores: what is done stays done.
+PLACE ?= _build
+LIBRARY := $(shell find nmpcrl/ book/published/ -name "[a-z]*.*" -not -name "*.pyc" 2>/dev/null)
+$(PLACE)/executed/%.ipynb: book/%.ipynb $(PLACE)/given/%.json $(LIBRARY)
+	@$(BIN)/python book/run.py $< $@ $(word 2,$^)
+
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke
 
@@ -89,10 +95,10 @@ byte_code = $(1)/bin/python -m compileall -qq -j 0 $(1)/lib >/dev/null 2>&1 || t
 	@touch $@
 
 # The kernel of JupyterLab is the Python of .venv.
-.venv-lab/ready: book/lab.txt .venv/ready
-	@echo "Installing JupyterLab, the pinned packages of $<, into .venv-lab: a minute, once."
+.venv-lab/ready: .venv/ready
+	@echo "Installing JupyterLab into .venv-lab: a minute, once."
 	@$(BIN)/python -m venv --clear .venv-lab
-	@.venv-lab/bin/pip install $(QUICKLY) -r $<
+	@.venv-lab/bin/pip install $(QUICKLY) --constraint environment.txt jupyterlab==4.6.6
 	@$(call byte_code,.venv-lab)
 	@$(BIN)/python -m ipykernel install --prefix .venv-lab --name python3 >/dev/null 2>&1
 	@touch $@

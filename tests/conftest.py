@@ -128,15 +128,6 @@ def site() -> Path:
 
 
 @pytest.fixture(scope="session")
-def printed(site) -> Path:
-    """The built book as PDF."""
-    path = site / "nmpcrl.pdf"
-    if not path.exists():
-        missing("no book is printed: run `make pdf`")
-    return path
-
-
-@pytest.fixture(scope="session")
 def browser():
     """A headless Chromium of the distribution."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)

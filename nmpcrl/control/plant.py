@@ -40,7 +40,7 @@ def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float, substeps
 class Plant(Described):
     """A plant that is sampled every `period` seconds.
 
-    Where a task has obstacles, the first two states are its position. A mass that is pushed:
+    Where a task has obstacles, the first two states are its position. A mass that is pushed::
 
         Plant(
             lambda state, push: ca.vertcat(state[2:], push),

@@ -130,7 +130,7 @@ def small(tmp_path, robot_module) -> Path:
 def small_book(place: Path) -> Path:
     for name in ("_static", "driver"):
         shutil.copytree(ROOT / "book" / name, place / "book" / name)
-    for name in ("_config.yml", "CITATION.cff", "book/references.bib", "book/build.py"):
+    for name in ("_config.yml", "Makefile", "book/build.py", "book/run.py"):
         shutil.copy2(ROOT / name, place / name)
     (place / "nmpcrl").symlink_to(ROOT / "nmpcrl")
     (place / "book/intro.md").write_text(INTRO)
@@ -160,7 +160,7 @@ def save(place: Path, *last, name: str = "one") -> None:
     nbformat.write(notebook, place / f"book/{name}.ipynb")
 
 
-CHOSEN = ("OMP_NUM_THREADS", "NMPCRL_FIGURES_FOR_PAGE")  # by a build itself
+CHOSEN = ("OMP_NUM_THREADS", "NO_COLOR")  # by a build itself
 
 
 def run(place: Path, *arguments: str) -> subprocess.CompletedProcess:
@@ -213,12 +213,11 @@ def test_a_whole_build_ends_with_the_path_of_the_book(whole):
 def test_a_build_that_failed_goes_on_with_what_no_change_of_a_source_has_made_stale(small):
     executions = small / "executions"
     (small / "_build/html").mkdir(parents=True)
-    (small / "book/intro.md").write_text("# A small book\n\nSee [the other](#two).\n")
+    (small / "book/intro.md").write_text("# A small book\n\nSee {doc}`two`.\n")
     save(small, new_code_cell(EXECUTION.format("x")))
     refused = run(small)
     assert refused.returncode == 1
     assert "intro.md:3: WARNING" in refused.stderr
-    assert "'two'" in refused.stderr
     assert not (small / "_build/html").exists()
     save(small, new_code_cell(EXECUTION.format("y")))
     assert run(small).returncode == 1
@@ -226,7 +225,6 @@ def test_a_build_that_failed_goes_on_with_what_no_change_of_a_source_has_made_st
     (small / "book/intro.md").write_text(INTRO)
     last = run(small)
     assert last.returncode == 0, last.stderr
-    assert "executed before: one" in last.stdout
     assert executions.read_text() == "xy"
 
 
@@ -255,20 +253,21 @@ def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(
 
 
 @pytest.mark.slow
-def test_a_build_after_a_whole_one_begins_anew_and_links_to_a_repository_that_is_set(
-    whole, tmp_path
-):
+def test_a_chapter_is_executed_again_when_it_or_what_it_is_given_has_changed(whole, tmp_path):
     again = shutil.copytree(whole, tmp_path / "again", symlinks=True)
     config = yaml.safe_load((again / "_config.yml").read_text())
     config["repository"]["url"] = "https://github.com/us/book"
     (again / "_config.yml").write_text(yaml.safe_dump(config))
     assert run(again).returncode == 0
-    assert (again / "executions").read_text() == "xx"
+    assert (again / "executions").read_text() == "x"
     page = (again / "_build/html/book/one.html").read_text()
     assert '<a href="one.ipynb" download' in page
     assert 'href="https://github.com/us/book"' in page
     assert outputs(again, "_build/html/book/one.ipynb")[-1] == "300\n"
     assert "github.com/us/book" in (again / "_build/html/book/intro.html").read_text()
+    (again / "book/one.ipynb").touch()
+    assert run(again).returncode == 0
+    assert (again / "executions").read_text() == "xx"
 
 
 @pytest.mark.slow
@@ -385,7 +384,7 @@ def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(whole
     set_up, answer, *_ = (one.text for one in page.select("details.hide pre"))
     assert "episodes = 300\n\nexperiments = ()" in set_up
     assert "d = ..." in answer
-    assert "d = 1.375" in page.select_one("details.solution").text
+    assert "d = 1.375" in page.select("details")[-1].text
     assert page.text.count("d = 1.375") == 1
     offered = nbformat.read(whole / "_build/html/book/one.ipynb", 4)
     assert [cell.source for cell in offered.cells if "answer" in cell.metadata.get("tags", [])] == [
@@ -428,5 +427,5 @@ def test_no_module_of_the_driver_changes_the_environment_of_who_imports_it():
 
 
 @pytest.mark.slow
-def test_a_chapter_runs_on_one_thread_strictly_and_its_figures_are_for_a_page(whole):
-    assert "1 1 1\n" in outputs(whole)
+def test_a_chapter_runs_on_one_thread_and_strictly(whole):
+    assert "1 1\n" in outputs(whole)

@@ -15,7 +15,7 @@ import nbformat
 import pytest
 from driver import project
 from driver.build import book, chapters, execute, train
-from driver.page import enrich
+from driver.page import prose
 from live_page import CHAPTERS, FRAMES
 
 from nmpcrl.learning import td_error
@@ -217,9 +217,9 @@ def test_an_editor_shows_a_paragraph_without_the_call_that_says_it(opened, folde
     code = [k for k, cell in enumerate(cells) if cell.cell_type == "code"]
     for k in code:
         assert shown.nth(k).locator(".jp-InputArea-editor").count() == (
-            not enrich.says(cells[k].source)
+            not prose.says(cells[k].source)
         )
-    assert any(enrich.says(cells[k].source) for k in code)
+    assert any(prose.says(cells[k].source) for k in code)
 
 
 def test_a_link_to_another_chapter_leads_to_its_file(opened):

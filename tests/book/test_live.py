@@ -6,9 +6,7 @@ from pathlib import Path
 import nbformat
 import numpy as np
 import pytest
-from bs4 import BeautifulSoup
 from driver.page import live
-from driver.paper import whole
 from live_python import assert_equal_to_python
 
 from nmpcrl.study import paper
@@ -212,10 +210,3 @@ def test_a_loop_that_ends_early_says_so(opened):
     said = "The solver found no plan at step 20; the closed loop ends there."
     assert tab.figure.locator("[role=status]").inner_text().strip() == said
     assert len(tab.shown()["found"]["states"]) == 20
-
-
-def test_the_book_as_one_document_leaves_live_figures_out(site):
-    document = whole.document(site, site.parent / "pdf/book.html", "")
-    assert "live.kink(nmpc" in BeautifulSoup(document, "html.parser").get_text()
-    assert "_static/live/" not in document
-    assert 'class="live"' not in document

@@ -168,9 +168,9 @@ def test_the_robot_is_on_the_first_screen_and_its_picture_is_not(opened, size):
     width, height = size
     tab = opened(FIGURE, viewport={"width": width, "height": height}).begun()
     assert tab.page.evaluate(f"{TOP}.bottom") < height
-    assert not tab.page.locator("article picture img").first.is_visible()
+    assert not tab.page.locator("article img").first.is_visible()
     tab.page.emulate_media(media="print")
-    assert tab.page.locator("article picture img").first.is_visible()
+    assert tab.page.locator("article img").first.is_visible()
 
 
 def test_a_worker_that_does_not_start_is_said(opened):

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 from live_page import ALSO, CHAPTERS, MOST, loaded
 
-PICTURE = "article :is(figure, .cell_output) img"
+PICTURE = "article img"
 FIRST = {chapter: figure for figure, chapter in reversed(CHAPTERS.items())}  # of each chapter
 IN_ORDER = f"""() => [...document.querySelectorAll("{PICTURE}, figure.live")]
     .map(one => one.matches("img") ? "picture" : one.dataset.figure)"""

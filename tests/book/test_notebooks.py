@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner
 from driver import project
 from driver.build import book, chapters
-from driver.page import enrich
+from driver.page.prose import calls_prose, says
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from papermill.cli import papermill
@@ -120,7 +120,7 @@ def test_a_cell_has_at_most_20_lines_of_plain_python(name):
 def test_prose_with_numbers_and_shown_source_have_cells_of_their_own(name):
     for cell in code(name):
         if re.search(r"^(say|source)\(", cell.source, flags=re.M):
-            assert enrich.calls_prose(cell.source), cell.source
+            assert calls_prose(cell.source), cell.source
 
 
 @each_notebook
@@ -128,7 +128,7 @@ def test_an_editor_hides_the_call_that_says_a_paragraph_and_no_other_code(name):
     hidden = {"jupyter": {"source_hidden": True}}
     for cell in code(name):
         shown = {key: cell.metadata[key] for key in ("jupyter",) if key in cell.metadata}
-        assert shown == (hidden if enrich.says(cell.source) else {}), cell.source
+        assert shown == (hidden if says(cell.source) else {}), cell.source
 
 
 PAGE_ONLY = {  # what only the page would know, and a notebook editor shows as it is written
@@ -149,7 +149,7 @@ PAGE_ONLY = {  # what only the page would know, and a notebook editor shows as i
 @pytest.mark.parametrize("what", PAGE_ONLY)
 def test_a_source_has_nothing_that_only_the_page_can_show(name, what):
     for cell in NOTEBOOKS[name].cells:
-        shown = cell.cell_type == "markdown" or enrich.calls_prose(cell.source)
+        shown = cell.cell_type == "markdown" or calls_prose(cell.source)
         if shown or what.startswith("a number"):
             assert not re.search(PAGE_ONLY[what], dedent(cell.source), flags=re.M), cell.source
         assert "figure" not in cell.metadata.get("mystnb", {})
@@ -177,7 +177,7 @@ def texts(cells: list) -> list[str]:
     for cell in cells:
         if cell.cell_type == "markdown":
             found.append(cell.source)
-        elif enrich.says(cell.source):
+        elif says(cell.source):
             calls = [
                 node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)
             ]

@@ -10,7 +10,6 @@ import pytest
 from bs4 import BeautifulSoup
 from driver import project
 from driver.build.render import MOVED
-from legibility import LETTERS, SHOWN
 
 PAGES = project.pages()
 LOADED = {  # what a browser fetches by itself
@@ -70,41 +69,6 @@ def test_no_reference_is_left_unresolved(html, page):
 def test_every_image_has_alt_text(html, page):
     images = html(f"{page}.html").find("article").find_all("img")
     assert [image["src"] for image in images if not image.get("alt", "").strip()] == []
-
-
-LETTERS_OF_SVG = re.compile(  # matplotlib draws letters 100 high and scales them
-    r'<g (?:style="[^"]*" )?transform="translate\([^)]*\)(?: rotate\([^)]*\))? scale\(([\d.]+) '
-)
-
-
-def letters(svg: str) -> float:
-    """Height of the smallest letters of a picture, over its width."""
-    width = float(re.search(r'<svg [^>]*width="([\d.]+)pt"', svg)[1])
-    return min(100 * float(scale) for scale in LETTERS_OF_SVG.findall(svg)) / width
-
-
-@each_page
-def test_every_figure_is_whole_and_readable_on_every_screen(site, html, page):
-    """A narrow file for telephones, a PNG beside each SVG, and letters of at least 10 pixels."""
-    folder = (site / f"{page}.html").parent
-    for image in html(f"{page}.html").find("article").find_all("img"):
-        picture = image.find_parent("picture")
-        assert picture, f"{image['src']} has no narrow version"
-        narrow, wide = (folder / one["srcset"] for one in picture.find_all("source"))
-        assert int(picture.find("source")["width"]) <= 360
-        if wide != folder / "../_static/closed_loop.svg":  # is stored, an SVG alone
-            assert (folder / image["src"]).suffix == ".png"
-        for file, is_narrow in ((wide, False), (narrow, True)):
-            if file.suffix == ".svg":
-                assert letters(file.read_text()) * SHOWN[is_narrow] >= LETTERS, file.name
-
-
-def test_small_letters_are_found():
-    small = (
-        '<svg width="504pt"><g transform="translate(1 2) rotate(-90) scale(0.06 -0.06)">'
-        '<g style="fill: #000000" transform="translate(1 2) scale(0.1 -0.1)">'
-    )
-    assert letters(small) == 6 / 504
 
 
 @each_page

@@ -68,4 +68,4 @@ def test_a_line_of_a_figure_stands_out_from_the_dark_ground_and_keeps_its_hue(co
 
 def test_a_figure_is_dark_on_a_screen_alone():
     assert STYLES.count("filter: invert") == 1
-    assert re.search(r"@media screen \{\n  html\[data-theme=\"dark\"\] \S+ \S+ img,", STYLES)
+    assert re.search(r"@media screen \{\n  html\[data-theme=\"dark\"\] \.bd-article img \{", STYLES)

@@ -79,32 +79,14 @@ CUT = f"""() => {WIDE}
   .filter(([one, style]) => ["hidden", "clip"].includes(style.overflowX))
   .map(([one]) => one.outerHTML.slice(0, 200))"""
 
-SILENT = f"""() => {WIDE}
-  .filter(([one, style]) => ["auto", "scroll"].includes(style.overflowX) && !one.matches("a"))
-  .filter(([one, style]) => one.tabIndex || !one.role || !one.ariaLabel
-    || !style.boxShadow.includes("inset"))
-  .map(([one]) => one.outerHTML.slice(0, 200))"""
-
 STOPS = """() => [...document.querySelectorAll(".math, .math *")]
-  .filter(one => one.tabIndex === 0 && !one.matches("[data-more], a"))
+  .filter(one => one.tabIndex === 0 && !one.matches("a"))
   .map(one => one.outerHTML.slice(0, 200))"""
 
 SMALL = """() => [...document.querySelectorAll(".bd-article :is(summary, button, .download a)")]
   .filter(one => one.checkVisibility())
   .filter(one => Math.min(one.offsetWidth, one.offsetHeight) < 24)
   .map(one => one.outerHTML.slice(0, 200))"""
-
-NAMELESS = """() => [...document.querySelectorAll(".bd-article .scrolls[data-more]")].flatMap(box => {
-  if (box.querySelector("th[rowspan]")) return [];  // names in two columns
-  box.scrollLeft = box.scrollWidth;
-  const { left } = box.getBoundingClientRect();
-  const away = [...box.querySelectorAll("tbody tr > th:first-child")].filter(one => {
-    const name = one.getBoundingClientRect();
-    return Math.abs(name.left - left) > 2 || name.width > box.clientWidth / 2;
-  });
-  box.scrollLeft = 0;
-  return away.map(one => one.outerHTML.slice(0, 200));
-})"""  # noqa: E501
 
 
 @dataclass
@@ -122,8 +104,6 @@ class Visit:
     themes: list[str | None] = field(default_factory=list)  # in the order of the views
     widths: list[int] = field(default_factory=list)  # of the page on `TELEPHONES`, all open [px]
     cut: list[str] = field(default_factory=list)  # is wider than its place and cannot scroll
-    silent: list[str] = field(default_factory=list)  # scrolls without focus, name or shadow
-    nameless: list[str] = field(default_factory=list)  # a row's name that scrolls away or hides it
     stops: list[str] = field(default_factory=list)  # a formula that takes the focus for nothing
     small: list[str] = field(default_factory=list)  # ours, and a finger may miss it
 
@@ -162,8 +142,6 @@ def look_at(browser: Any, path: Path, views: Views) -> Visit:
         tab.evaluate(SETTLED)
         seen.widths.append(tab.evaluate(WIDTH))
         seen.cut += tab.evaluate(CUT)
-        seen.silent += tab.evaluate(SILENT)
-        seen.nameless += tab.evaluate(NAMELESS)
     seen.stops, seen.small = tab.evaluate(STOPS), tab.evaluate(SMALL)
     judge(tab, seen, views)
     tab.close()

@@ -12,8 +12,8 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-SHOWN = {True: 342, False: 752}  # pixels: on a page 390 wide if narrow, and on one 1400 wide
-LETTERS = 10  # pixels, at least
+SHOWN = 342  # pixels that a figure is wide on a page 390 wide
+LETTERS = 7.5  # pixels, at least
 CONTRAST = 3.0  # to white, at least
 SLACK = 2.0  # points that boxes may have in common: there is air around the letters
 
@@ -53,7 +53,7 @@ def _name(text: Text) -> str:
 def _pixels(text: Text, figure: Figure) -> float:
     """How high the letters are where the figure is as wide as the page's text."""
     width = figure.get_size_inches()[0]
-    return text.get_fontsize() / 72 * SHOWN[width < 5] / width
+    return text.get_fontsize() / 72 * SHOWN / width
 
 
 def _placed(figure: Figure) -> list[Text]:

@@ -53,10 +53,10 @@
 
   // The picture for those who have no script is for them alone.
   function replacePicture(figure) {
-    const before = [...document.querySelectorAll("article picture")].filter((one) => (
+    const before = [...document.querySelectorAll("article img")].filter((one) => (
       one.compareDocumentPosition(figure) & Node.DOCUMENT_POSITION_FOLLOWING
     )).at(-1);
-    before?.closest("div").classList.add("pictured");
+    before?.closest("p, figure").classList.add("pictured");
   }
 
   function build(figure, data, nmpc) {

@@ -14,14 +14,13 @@ Each build has its own place, in the last column, and six steps, each a function
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build, and so do verdicts, as `claims.reproduce` says.
               What the live figures solve with is compiled meanwhile
-4. `execute`  the chapters with papermill, two at a time, into PLACE/executed
-5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, exercises
+4. `execute`  the chapters with papermill into PLACE/executed: make has a rule a chapter, so what
+              nothing has made stale is not executed again
+5. `dress`    the pages of the mirror: paragraphs, boxes and captions, as `enrich` says, exercises
               unsolved, as `questions` says, and the scripts of live figures, as `live` says
-6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
-              repaired for all readers, as `accessible` says
+6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
 
-PLACE/html is removed first and put there last: it exists only if everything went well. What was
-executed before something went wrong is not executed again, as long as nothing it rests on changed.
+PLACE/html is removed first and put there last: it exists only if everything went well.
 """
 
 import os
@@ -32,7 +31,7 @@ import click
 
 from driver.build.chapters import Given, ask, known, parameters, together, values
 from driver.build.dress import dress
-from driver.build.execute import execute_all, finished
+from driver.build.execute import execute_all
 from driver.build.mirror import mirror
 from driver.build.render import render
 from driver.build.train import compiling_for_pages, measure, require_published, train
@@ -52,10 +51,10 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
             train(needs.experiments, needs.summaries)
         measure(needs.beforehand)
         execute_all(place, jobs)
+        for notebook in jobs:
+            shutil.copy2(place / "executed" / notebook.name, place / "src" / notebook)
         dress(place / "src", jobs)
         render(place, strict)
-        for notebook in jobs:
-            finished(place / "executed" / notebook.name).unlink()
     return place / "html"
 
 

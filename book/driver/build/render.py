@@ -6,10 +6,12 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import nbformat
 
-from driver.page import accessible, enrich, pictures, questions
+from driver.page import questions
+from driver.page.prose import calls_prose
 from driver.project import ROOT, Failure, from_yaml, pages, shown
 
 MOVED = {  # addresses of pages that are no more
@@ -52,13 +54,22 @@ def render(place: Path, strict: bool) -> None:
     if result.returncode:
         raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
     for path in (place / "executed").glob("*.ipynb"):
-        notebook = pictures.plain(enrich.download(questions.opened(nbformat.read(path, 4))))
+        notebook = download(questions.opened(nbformat.read(path, 4)))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
-    accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")
     title = from_yaml("_config.yml")["title"]
     for old, new in {"index": f"{pages()[0]}.html", **MOVED}.items():
         (place / f"html/{old}.html").write_text(ELSEWHERE.format(title=title, page=new))
+
+
+def download(executed: Any) -> Any:
+    """An executed notebook for whoever opens it: prose without the calls that made it."""
+    executed.metadata.pop("papermill", None)
+    for cell in executed.cells:
+        cell.metadata.pop("papermill", None)
+        if cell.cell_type == "code" and calls_prose(cell.source):
+            cell.metadata["jupyter"] = {"source_hidden": True}
+    return executed
 
 
 def warnings(log: Path, most: int = 20) -> str:

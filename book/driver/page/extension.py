@@ -1,5 +1,6 @@
 """A Sphinx extension: what this book needs that Sphinx, MyST-NB and pandas leave out."""
 
+import re
 import sys
 from typing import Any
 
@@ -10,6 +11,7 @@ from sphinx.application import Sphinx
 from driver.project import ROOT
 
 FLOATS = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
+TABLE = re.compile(r"<table\b.*?</table>", flags=re.S)
 SHORT = "ndarray[tuple[Any, ...], dtype[float64]]"
 
 
@@ -18,6 +20,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
     sys.path.insert(0, str((ROOT / "nmpcrl").resolve().parent))
     app.connect("autodoc-process-signature", with_aliases)
     app.connect("doctree-resolved", with_aliases_of_fields)
+    app.connect("doctree-read", with_tags)
+    app.connect("html-page-context", accessible)
     app.connect("autodoc-process-docstring", without_macros, priority=400)  # before napoleon's
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -25,7 +29,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 def with_aliases(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, given: str | None, returned: str
 ) -> tuple[str | None, str]:
-    """A signature with `Array` for `Vector` and `Matrix`, in the place of what Python makes of them."""
+    """A signature with `Array` in the place of what Python makes of `Vector` and `Matrix`."""
     return given and given.replace(FLOATS, "Array"), returned and returned.replace(FLOATS, "Array")
 
 
@@ -41,3 +45,27 @@ def without_macros(
 ) -> None:
     """A docstring in which `|speed|` is an absolute value and no macro of reStructuredText."""
     lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
+def with_tags(app: Sphinx, doctree: nodes.document) -> None:
+    r"""Leave an equation that has a `\tag` to MathJax, which numbers it by that."""
+    for node in doctree.findall(nodes.math_block):
+        if r"\tag{" in (tex := node.astext()):
+            node["nowrap"] = True
+            node.children = [nodes.Text(rf"\[{tex}\]")]
+
+
+def accessible(app: Sphinx, page: str, template: str, context: dict[str, Any], _: Any) -> None:
+    """Give headers of tables a scope, and each table a place in which it scrolls."""
+    context["body"] = TABLE.sub(_scrolling, context.get("body", ""))
+
+
+def _scrolling(table: re.Match[str]) -> str:
+    head, end, body = table[0].rpartition("</thead>")
+    scoped = _scoped(head, "col") + end + _scoped(body, "row")
+    return f'<div class="scrolls" tabindex="0">{scoped}</div>'
+
+
+def _scoped(part: str, scope: str) -> str:
+    part = re.sub(r"<th\b[^>]*>\s*</th>", "<td></td>", part)  # a header of nothing
+    return re.sub(r"<th(?=[ >])(?![^>]*\bscope=)", f'<th scope="{scope}"', part)

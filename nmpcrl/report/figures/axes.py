@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
-from nmpcrl.report.figures.sheet import fitting, sheet
+from nmpcrl.report.figures.sheet import fitting
 from nmpcrl.report.figures.style import (
     BAND,
     DECAY_TITLES,
@@ -28,12 +28,11 @@ from nmpcrl.report.figures.style import (
     thin,
 )
 
-NARROW_ROW = 0.7  # of a row of maps on a narrow sheet, over one on a wide sheet
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
 LEAST = 1.5  # high over low of an axis that has hardly anything to show
 FEW = 20  # high over low of an axis on which powers of ten are too few
 WHOLE = {"steps": [1, 2, 2.5, 5, 10], "integer": True, "min_n_ticks": 1}  # of a MaxNLocator
-MAPS = {False: 3, True: 2}  # side by side: on a wide sheet, on a narrow one
+MAPS = 2  # side by side
 
 
 def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
@@ -53,7 +52,7 @@ def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
 
 
 def map_grid(
-    names: Sequence[str], row: float, rest: float, *, low: int = 3, **options: Any
+    names: Sequence[str], row: float, rest: float, **options: Any
 ) -> tuple[Figure, dict[str, Axes], Any]:
     """A map for each name, to one scale; what is left over in the last row is hidden.
 
@@ -61,19 +60,15 @@ def map_grid(
         names: of the layouts.
         row: height of a row of maps [inches].
         rest: height of what stands above and below them [inches].
-        low: how many stand side by side on a low sheet.
         options: of `subplots`.
 
     Returns:
         The figure, the map of each name, and all maps row by row.
     """
-    columns = min(MAPS[sheet().narrow], len(names))
-    if sheet().low:
-        columns = min(low, len(names))
+    columns = min(MAPS, len(names))
     rows = -(-len(names) // columns)
-    tall = NARROW_ROW * row * rows + rest + 0.5
-    options = {"squeeze": False, "sharex": True, "sharey": True, "tall": tall} | options
-    figure, grid = subplots(rows, columns, row * rows + rest, across=columns, **options)
+    options = {"squeeze": False, "sharex": True, "sharey": True} | options
+    figure, grid = subplots(rows, columns, row * rows + rest, **options)
     for axes in grid.flat[len(names) :]:
         axes.set_visible(False)
     return figure, dict(zip(names, grid.flat, strict=False)), grid

@@ -1,34 +1,24 @@
-"""What a figure is drawn on, wide or narrow or low, and how a notebook shows it.
+"""The sheet that figures are drawn on: as wide as a telephone can still show, on every page.
 
-A function that `page` decorates draws on a sheet as wide as the book's text. The figure that it
-returns can call it again for a narrow one, whose panels stand below each other: for a telephone;
-and, if it is too high for that, for one as low as a slide is.
+A function that `page` decorates draws with its look; `subplots` puts at most two panels beside each
+other, and the others below.
 """
 
-import os
 import re
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass
-from functools import partial, wraps
+from collections.abc import Callable, Sequence
+from functools import wraps
 from io import BytesIO
 from typing import Any, ParamSpec
 
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import display
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-from nmpcrl import Matrix
-from nmpcrl.report.figures.moving import Way, playing
 
 PAGE: dict[Any, Any] = {
     "axes.spines.right": False,
@@ -36,91 +26,27 @@ PAGE: dict[Any, Any] = {
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
     "figure.dpi": 150,
-    "font.size": 9.6,  # "small" is 8
+    "font.size": 10.0,  # "small" is 8.3
     "legend.frameon": False,
     "lines.linewidth": 1.6,
-    "pdf.fonttype": 42,  # letters stay letters where a PDF is edited
     "svg.fonttype": "path",  # an image has no fonts but its own, and nobody searches in it
     "svg.hashsalt": "nmpcrl",  # the same figure, the same bytes
 }
-MIME = "application/vnd.nmpcrl.figure+json"  # what the book's page shows, beside "image/png"
-FOR_PAGE = "NMPCRL_FIGURES_FOR_PAGE"  # set where `MIME` is wanted, too: it takes time and room
-HEAVY = 300_000  # bytes of an SVG from which on a page shows a PNG
-SHARP = 216  # dots an inch of a narrow PNG: telephones show several where a page counts one
+WIDTH = 5.0  # inches: a page 390 pixels wide shows 10 points as 10 pixels
+HEAVY = 300_000  # bytes of an SVG from which on a PNG is shown
 TALL = 2.0  # inches of a panel that stands above others, at most
-REST = 1.1  # inches of a narrow figure for what is not a panel
-CANVASES = {"svg": FigureCanvasSVG, "pdf": FigureCanvasPdf, "png": FigureCanvasAgg}
-DATES = {"svg": "Date", "pdf": "CreationDate"}  # what a file would say of when it was made
+REST = 1.1  # inches of such a figure for what is not a panel
+CANVASES = {"svg": FigureCanvasSVG, "png": FigureCanvasAgg}
 
 Parameters = ParamSpec("Parameters")
 Panels = Any  # an array of Axes
 
 
-@dataclass(frozen=True)
-class Sheet:
-    """What a figure is drawn on."""
-
-    width: float  # inches
-    narrow: bool = False
-    height: float = np.inf  # inches, at most
-
-    @property
-    def low(self) -> bool:
-        """Whether there is no room for many rows."""
-        return bool(np.isfinite(self.height))
-
-
-WIDE, NARROW = Sheet(7.0), Sheet(3.6, narrow=True)
-SLIDE = Sheet(7.0, height=3.6)  # on 1280 pixels, "small" letters are 20 of them
-_open: ContextVar[Sheet | None] = ContextVar("sheet", default=None)
-
-
-def sheet() -> Sheet:
-    """What is being drawn on."""
-    return _open.get() or WIDE
-
-
-class TooHeavy(Exception):
-    """A file has too many bytes."""
-
-
-class Limited(BytesIO):
-    """A file that takes no more than so many bytes."""
-
-    def __init__(self, most: float) -> None:
-        super().__init__()
-        self._most = most
-
-    def write(self, data: Any) -> int:
-        written = super().write(data)
-        if self.tell() >= self._most:
-            raise TooHeavy
-        return written
-
-
 class Drawn(Figure):
-    """A figure that can be drawn once more on another sheet, and shows itself."""
+    """A figure that shows itself in a notebook, as an SVG or, where that is heavy, as a PNG."""
 
-    again: Callable[[Sheet], Figure] | None = None
     panels: Panels  # rows and columns as they were asked for, wherever they stand
     across = 0  # columns side by side
-
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        """As a `Figure` begins; nothing of it moves."""
-        super().__init__(*args, **kwargs)
-        self.ways: list[Way] = []
-
-    def moves(self, axes: Axes, artist: Artist, points: Matrix, stands: int) -> None:
-        """Let an artist play through a way.
-
-        Args:
-            axes: whose data the way is in.
-            artist: drawn at `points[stands]`.
-            points: shape (K, 2), at equal distances in time.
-            stands: see above.
-        """
-        artist.set_gid(f"way{len(self.ways)}")
-        self.ways.append(Way(artist, axes, points, stands))
 
     @property
     def finding(self) -> str:
@@ -130,34 +56,20 @@ class Drawn(Figure):
             titles = [axes.get_title(loc="left") for axes in self.axes]
         return in_words("; ".join(filter(None, titles)))
 
-    def written(self, kind: str, most: float = np.inf) -> bytes:
-        """The figure as "svg", "pdf" or "png"; the same figure gives the same bytes.
-
-        Raises:
-            TooHeavy: it has `most` bytes or more, and is not written to its end.
-        """
-        file = Limited(most)
-        options: dict[str, Any] = {"metadata": {DATES[kind]: None}} if kind in DATES else {}
-        with plt.rc_context(PAGE), self._dots():
-            canvas = self._settled(kind)
-            if kind == "png" and self.get_figwidth() <= NARROW.width:
-                self.set_dpi(SHARP)
-            getattr(canvas, f"print_{kind}")(file, **options)
-        data = file.getvalue()
-        if kind == "svg" and self.ways:
-            return playing(data.decode(), self.ways).encode()
-        return data
+    def written(self, kind: str) -> bytes:
+        """The figure as "svg" or "png"; the same figure gives the same bytes."""
+        file, options = BytesIO(), {"metadata": {"Date": None}} if kind == "svg" else {}
+        with plt.rc_context(PAGE):
+            getattr(self._settled(kind), f"print_{kind}")(file, **options)
+        return file.getvalue()
 
     def _ipython_display_(self) -> None:
-        shown: dict[str, Any] = {"text/plain": self.finding, "image/png": self._png()}
-        if FOR_PAGE in os.environ:
-            shown[MIME] = {"finding": self.finding, "wide": self._file()}
-            shown[MIME]["plays"] = bool(self.ways)
-            shown[MIME]["pdf"] = b64encode(self.written("pdf")).decode()
-            if self.again is not None:
-                shown[MIME]["narrow"] = self._on(NARROW)
-                if self.get_figheight() > SLIDE.height:
-                    shown[MIME]["slide"] = self._on(SLIDE)
+        svg = self.written("svg")
+        shown = {"text/plain": self.finding}
+        if len(svg) < HEAVY:
+            shown["image/svg+xml"] = svg.decode()
+        else:
+            shown["image/png"] = b64encode(self.written("png")).decode()
         display(shown, raw=True)  # type: ignore[no-untyped-call]
 
     def _settled(self, kind: str) -> Any:
@@ -176,54 +88,14 @@ class Drawn(Figure):
         self.set_layout_engine("none")  # what is laid out stays so
         return canvas
 
-    @contextmanager
-    def _dots(self) -> Iterator[None]:
-        """However many an inch a file has, there are as many as before after it."""
-        before = self.get_dpi()
-        try:
-            yield
-        finally:
-            self.set_dpi(before)
-
-    def _on(self, other: Sheet) -> dict[str, Any]:
-        """The file of the figure on another sheet: SVG, or PNG where that is heavy."""
-        assert self.again
-        drawn = self.again(other)
-        assert isinstance(drawn, Drawn)
-        try:
-            return drawn._size() | {"svg": drawn.written("svg", HEAVY).decode()}
-        except TooHeavy:
-            return drawn._size() | {"png": drawn._png()}
-
-    def _file(self) -> dict[str, Any]:
-        """The size of the figure, and its SVG, light or "heavy"."""
-        svg = self.written("svg")
-        return self._size() | {"svg" if len(svg) < HEAVY else "heavy": svg.decode()}
-
-    def _size(self) -> dict[str, int]:
-        """Width and height in a browser's pixels."""
-        width, height = np.round(96 * self.get_size_inches()).astype(int).tolist()
-        return {"width": width, "height": height}
-
-    def _png(self) -> str:
-        return b64encode(self.written("png")).decode()
-
 
 def page(draw: Callable[Parameters, Figure]) -> Callable[Parameters, Figure]:
-    """Let a function draw with the look of `PAGE`, and its figure be drawn again.
-
-    What it is given is kept for that, and must not be changed or used up.
-    """
+    """Let a function draw with the look of `PAGE`."""
 
     @wraps(draw)
     def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Figure:
-        if _open.get():  # a part of another figure
-            return draw(*args, **kwargs)
-        on = partial(_drawn_on, draw=partial(draw, *args, **kwargs))
-        figure = on(WIDE)
-        if isinstance(figure, Drawn):
-            figure.again = on
-        return figure
+        with plt.rc_context(PAGE):
+            return _finished(draw(*args, **kwargs))
 
     return drawn
 
@@ -233,39 +105,35 @@ def subplots(
     columns: int = 1,
     height: float = 3.2,
     *,
-    across: int = 1,
+    across: int | None = None,
     rowwise: bool = False,
     tall: float | None = None,
     **options: Any,
 ) -> tuple[Figure, Any]:
-    """A figure as wide as the sheet, and its axes as `plt.subplots` returns them.
-
-    On a narrow sheet the columns of panels stand below each other, `across` of them side by side.
-    On a low one they are lower.
+    """A figure and its axes, as `plt.subplots` returns them; further columns stand below.
 
     Args:
         rows: of panels.
         columns: of panels.
-        height: of the figure on a wide sheet [inches].
-        across: how many columns stand side by side on a narrow sheet.
-        rowwise: the panels of a row stay together on a narrow sheet, not those of a column.
-        tall: height of the figure on a narrow sheet [inches]; from `height` if absent.
+        height: of the figure, if all columns stand side by side [inches].
+        across: how many columns do; of more than two an even number has two, an odd one has one.
+        rowwise: the panels of a row stay together below each other, not those of a column.
+        tall: height of the figure if some stand below others [inches]; from `height` if absent.
         options: of `Figure.subplots`.
     """
-    narrow, squeeze = sheet().narrow, options.pop("squeeze", True)
+    squeeze = options.pop("squeeze", True)
+    across = across or (columns if columns < 3 else 2 - columns % 2)
     with plt.rc_context(PAGE):
         figure: Any = plt.figure(FigureClass=Drawn, layout="constrained")
         plt.close(figure)  # a notebook shows it once
-        if narrow:
+        if across < columns:
             shared = {name: options.get(name) for name in ("sharex", "sharey")}
             panels = _below_each_other(figure, (rows, columns, across), shared, rowwise=rowwise)
+            stacked = rows * -(-columns // across)
+            height = tall or REST + stacked * min(TALL, (height - REST / 2) / rows)
         else:
-            across = columns
             panels = figure.subplots(rows, columns, squeeze=False, **options)
-    if narrow:
-        stacked = rows * -(-columns // across)
-        height = tall or REST + stacked * min(TALL, (height - REST / 2) / rows)
-    figure.set_size_inches(sheet().width, min(height, sheet().height))
+    figure.set_size_inches(WIDTH, height)
     figure.panels, figure.across = panels, across
     if not squeeze:
         return figure, panels
@@ -273,26 +141,20 @@ def subplots(
 
 
 def mosaic(
-    rows: Sequence[Sequence[str]], heights: Sequence[float], height: float, tall: Sequence[float]
+    rows: Sequence[Sequence[str]], heights: Sequence[float], height: float
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A figure as wide as the sheet, and its axes by name, as `plt.subplot_mosaic` returns them.
-
-    On a narrow sheet they stand below each other in the order in which they are read.
+    """A figure and its axes by name, as `plt.subplot_mosaic` returns them.
 
     Args:
         rows: of names; one that stands several times in a row is as much wider.
-        heights: of the rows on a wide sheet, relative to each other.
-        height: of the figure on a wide sheet [inches].
-        tall: heights of the panels on a narrow sheet [inches].
+        heights: of the rows, relative to each other.
+        height: of the figure [inches].
     """
-    if sheet().narrow:
-        rows = [(name,) for name in dict.fromkeys(name for row in rows for name in row)]
-        heights, height = tall, REST + sum(tall)
     with plt.rc_context(PAGE):
         figure, panels = plt.subplot_mosaic(
             [list(row) for row in rows],
             FigureClass=Drawn,
-            figsize=(sheet().width, height),
+            figsize=(WIDTH, height),
             layout="constrained",
             height_ratios=heights,
         )
@@ -307,8 +169,8 @@ def in_words(title: str) -> str:
     return " ".join(re.sub(r"\$(.*?)\$", lambda found: _spoken(found[1]), title).split())
 
 
-def fitting(labels: list[str], size: float = 9.6) -> int:
-    """How many columns of entries a legend with these labels has room for on the sheet.
+def fitting(labels: list[str], size: float = 10.0) -> int:
+    """How many columns of entries a legend with these labels has room for.
 
     Args:
         labels: of the entries.
@@ -317,30 +179,19 @@ def fitting(labels: list[str], size: float = 9.6) -> int:
     entries = [size / 72 * (5 + 0.58 * len(in_words(label))) for label in labels]
     for columns in range(len(entries), 1, -1):
         filled = [max(column) for column in np.array_split(entries, columns)]
-        if sum(filled) - 2 * size / 72 <= sheet().width:  # nothing stands after the last
+        if sum(filled) - 2 * size / 72 <= WIDTH:  # nothing stands after the last
             return columns
     return 1
 
 
-def _drawn_on(on: Sheet, draw: Callable[[], Figure]) -> Figure:
-    """The figure of a function, on a sheet."""
-    with plt.rc_context(PAGE), _opened(on):
-        figure = draw()
-        for axes in figure.axes:
-            for title in (axes.title, axes._left_title):  # type: ignore[attr-defined]
-                title.set_wrap(True)
-        if isinstance(figure, Drawn) and on.narrow:
-            _label_each_row(figure)
+def _finished(figure: Figure) -> Figure:
+    """A drawn figure with titles that wrap, and labels in each row of panels."""
+    for axes in figure.axes:
+        for title in (axes.title, axes._left_title):  # type: ignore[attr-defined]
+            title.set_wrap(True)
+    if isinstance(figure, Drawn):
+        _label_each_row(figure)
     return figure
-
-
-@contextmanager
-def _opened(on: Sheet) -> Iterator[None]:
-    before = _open.set(on)
-    try:
-        yield
-    finally:
-        _open.reset(before)
 
 
 def _below_each_other(

@@ -14,7 +14,6 @@ from matplotlib.font_manager import FontProperties
 from nmpcrl import Vector
 from nmpcrl.report.figures.sheet import mosaic as mosaic
 from nmpcrl.report.figures.sheet import page as page
-from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.sheet import subplots as subplots
 from nmpcrl.study.paper import THETA_NAMES
 
@@ -48,7 +47,7 @@ LOOKS = {
 INK, TEAL, WINE = "0.25", "#1B7F79", "#882255"  # none of them is a learner's
 AT_ONE: dict[str, Any] = {"color": "0.5", "linewidth": 0.9}  # what a ratio is compared to
 BAND: dict[str, Any] = {"facecolor": "0.92", "edgecolor": "0.5", "linewidth": 0.6, "zorder": 0}
-MARKS = {False: 110, True: 54}  # characters of a line on a wide sheet, on a narrow one
+MARK = 78  # characters of a line
 QUIET = "0.55"  # the grey of what only stands behind
 PALE = 0.8  # of a grey that is too pale to be seen on white
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
@@ -140,7 +139,7 @@ def marked(figure: Figure, mark: str) -> Figure:
     """The figure with a line that says where its runs come from: below, or above its legend."""
     if figure.legends:
         legend = figure.legends[0]
-        legend.set_title(fill(mark, MARKS[sheet().narrow]), prop=FontProperties(size="small"))
+        legend.set_title(fill(mark, MARK), prop=FontProperties(size="small"))
         legend.get_title().set_color("0.35")
         return figure
     figure.supxlabel(mark, x=0.99, ha="right", fontsize="small", color="0.35", wrap=True)

@@ -1,4 +1,4 @@
-"""A figure is drawn wide and narrow by one function, is read in words, and can be seen."""
+"""A figure has at most two panels beside each other, is read in words, and can be seen."""
 
 import ast
 from base64 import b64decode
@@ -32,11 +32,6 @@ def bars(count: int = 3) -> sheet.Figure:
     return style.headed(figure, r"$\theta_x$ grows")
 
 
-@sheet.page
-def outer() -> sheet.Figure:
-    return bars(1)
-
-
 def places(figure: sheet.Figure) -> list[tuple[int, int]]:
     """Row and column of each panel."""
     specs = [axes.get_subplotspec() for axes in figure.axes]
@@ -51,15 +46,11 @@ def shown(figure: sheet.Figure, monkeypatch) -> dict:
     return bundles[0]
 
 
-def narrow(figure: sheet.Figure) -> sheet.Figure:
-    return figure.again(sheet.NARROW)
-
-
-# Wide and narrow
+# Panels
 
 
 def test_every_figure_function_is_drawn_by_a_test_of_this_folder():
-    """And so it is looked at, wide and narrow: see `legible`."""
+    """And so it is looked at: see `legible`."""
     tests = "".join(path.read_text() for path in TESTS.rglob("test_*.py"))
     missing = [
         f"{path.stem}.{node.name}"
@@ -72,12 +63,11 @@ def test_every_figure_function_is_drawn_by_a_test_of_this_folder():
     assert not missing
 
 
-def test_panels_beside_each_other_stand_below_each_other_on_a_narrow_sheet():
-    wide = bars()
-    assert places(wide) == [(0, 0), (0, 1), (0, 2)]
-    assert places(narrow(wide)) == [(0, 0), (1, 0), (2, 0)]
-    assert wide.get_size_inches()[0] == sheet.WIDE.width
-    assert narrow(wide).get_size_inches()[0] == sheet.NARROW.width
+def test_at_most_two_panels_stand_beside_each_other():
+    assert places(bars(2)) == [(0, 0), (0, 1)]
+    assert places(bars(3)) == [(0, 0), (1, 0), (2, 0)]
+    assert places(bars(4)) == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    assert bars(4).get_size_inches()[0] == sheet.WIDTH
 
 
 @pytest.mark.parametrize(
@@ -90,71 +80,36 @@ def test_panels_beside_each_other_stand_below_each_other_on_a_narrow_sheet():
     ],
 )
 def test_columns_stay_together_or_rows_do(options, expected):
-    draw = sheet.page(lambda: sheet.subplots(2, 3, **options)[0])
-    assert places(draw()) == [(i, j) for i in (0, 1) for j in (0, 1, 2)]
-    assert places(narrow(draw())) == expected
-
-
-@pytest.mark.slow
-def test_a_figure_that_is_too_high_for_a_slide_is_drawn_for_one(monkeypatch):
-    monkeypatch.setenv(sheet.FOR_PAGE, "1")
-    for height, expected in ((3.6, False), (5.0, True)):
-        figure = sheet.page(lambda high=height: sheet.subplots(2, 1, high)[0])()
-        drawn = shown(figure, monkeypatch)[sheet.MIME]
-        assert ("slide" in drawn) == expected
-        if expected:
-            assert (drawn["slide"]["width"], drawn["slide"]["height"]) == (672, 346)
-
-
-def test_a_mosaic_is_read_row_by_row_on_a_narrow_sheet():
-    rows = (("all", "all"), ("left", "right"))
-
-    @sheet.page
-    def draw() -> sheet.Figure:
-        figure, panels = sheet.mosaic(rows, (2, 1), 4.0, (1.5, 1.0, 1.0))
-        assert list(panels) == ["all", "left", "right"]
-        return figure
-
-    assert places(draw()) == [(0, 0), (1, 0), (1, 1)]
-    assert places(narrow(draw())) == [(0, 0), (1, 0), (2, 0)]
-    assert draw().get_size_inches().tolist() == [sheet.WIDE.width, 4.0]
-    assert narrow(draw()).get_size_inches().tolist() == [sheet.NARROW.width, 3.5 + sheet.REST]
+    assert places(sheet.page(lambda: sheet.subplots(2, 3, **options)[0])()) == expected
 
 
 def test_what_a_panel_said_for_those_beside_it_each_says_for_itself_below():
-    wide = bars()
-    assert [axes.get_ylabel() for axes in wide.axes] == ["height [m]", "", ""]
-    assert [axes.get_ylabel() for axes in narrow(wide).axes] == ["height [m]"] * 3
-    for axes in narrow(wide).axes:
+    assert [axes.get_ylabel() for axes in bars(2).axes] == ["height [m]", ""]
+    for axes in bars(3).axes:
+        assert axes.get_ylabel() == "height [m]"
         assert axes.yaxis.get_tick_params()["labelleft"]
 
 
-def test_a_figure_that_is_a_part_of_another_is_drawn_on_its_sheet():
-    assert outer().get_size_inches()[0] == sheet.WIDE.width
-    assert narrow(outer()).get_size_inches()[0] == sheet.NARROW.width
-
-
 def test_a_legend_has_as_many_columns_as_there_is_room_for():
-    labels = ["a line that has a name", "another line", "a third one", "and one more line of them"]
-
-    def draw() -> sheet.Figure:
+    @sheet.page
+    def draw(labels: list[str]) -> sheet.Figure:
         figure, axes = sheet.subplots()
         below(figure, [axes.plot([0, 1], color="black", label=label)[0] for label in labels])
         return style.headed(figure, "Four lines")
 
-    wide = sheet.page(draw)()
-    assert wide.legends[0]._ncols > narrow(wide).legends[0]._ncols
-    assert not flaws(wide)
-    assert not flaws(narrow(wide))
+    short = draw(["one", "two", "three", "four"])
+    long = draw(["a line that has a name", "another line", "a third one", "and one more of them"])
+    assert short.legends[0]._ncols > long.legends[0]._ncols
+    assert not flaws(short)
+    assert not flaws(long)
 
 
 def test_a_title_is_broken_where_the_sheet_ends_and_never_inside_a_formula():
     finding = r"Of many rollouts in many layouts, most end with $\theta_c = d_o + 1$ or above it"
-    wide = sheet.page(lambda: style.headed(sheet.subplots()[0], finding))()
-    assert wide.finding == finding.replace("$", "").replace("\\", "")
-    below_each_other = narrow(wide)
-    below_each_other.draw_without_rendering()
-    lines = below_each_other._suptitle._get_wrapped_text().split("\n")
+    figure = sheet.page(lambda: style.headed(sheet.subplots()[0], finding))()
+    assert figure.finding == finding.replace("$", "").replace("\\", "")
+    figure.draw_without_rendering()
+    lines = figure._suptitle._get_wrapped_text().split("\n")
     assert len(lines) > 1
     assert all(line.count("$") % 2 == 0 for line in lines)
 
@@ -195,31 +150,9 @@ def test_without_a_title_of_its_own_a_figure_finds_what_its_panels_do():
     assert figure.finding == "It falls; it rises"
 
 
-@pytest.mark.parametrize("kind", ["svg", "pdf", "png"])
+@pytest.mark.parametrize("kind", ["svg", "png"])
 def test_the_same_figure_gives_the_same_bytes(kind):
     assert bars().written(kind) == bars().written(kind)
-
-
-@sheet.page
-def titled() -> sheet.Figure:
-    """Some of its titles fit on a telephone by a hair, or do not, by how wide letters are drawn."""
-    figure, panels = sheet.subplots(6, 1, height=12.0)
-    for count, axes in enumerate(panels, start=17):
-        axes.set(xticks=[], yticks=[])
-        axes.set_title(" ".join(["il"] * count), loc="left")
-    return figure
-
-
-@pytest.mark.parametrize("kind", ["svg", "pdf"])
-def test_a_file_is_what_matplotlib_writes_and_the_next_one_is_the_same(kind):
-    """One drawing for each, where `savefig` lays out and draws anew."""
-    here, there = titled().again(sheet.NARROW), titled().again(sheet.NARROW)
-    expected = BytesIO()
-    with plt.rc_context(sheet.PAGE):
-        there.draw_without_rendering()
-        there.savefig(expected, format=kind, metadata={sheet.DATES[kind]: None})
-    assert here.written(kind) == here.written(kind) == expected.getvalue()
-    assert here.get_dpi() == sheet.PAGE["figure.dpi"]
 
 
 def test_a_title_above_a_map_with_equal_scales_is_within_the_figure():
@@ -232,33 +165,18 @@ def test_a_title_above_a_map_with_equal_scales_is_within_the_figure():
     assert (image[:3] == 1).all()
 
 
-def test_a_notebook_is_shown_the_wide_figure_alone(monkeypatch):
-    monkeypatch.delenv(sheet.FOR_PAGE, raising=False)
+def test_a_notebook_is_shown_one_picture_and_its_finding(monkeypatch):
     bundle = shown(bars(), monkeypatch)
-    assert set(bundle) == {"text/plain", "image/png"}
+    assert set(bundle) == {"text/plain", "image/svg+xml"}
     assert bundle["text/plain"] == "theta_x grows"
-    assert b64decode(bundle["image/png"]) == bars().written("png")
-
-
-def test_a_page_is_given_the_finding_and_both_sizes(monkeypatch):
-    monkeypatch.setenv(sheet.FOR_PAGE, "1")
-    page = shown(bars(), monkeypatch)[sheet.MIME]
-    assert page["finding"] == "theta_x grows"
-    assert page == shown(bars(), monkeypatch)[sheet.MIME]
-    assert page["wide"]["svg"] != page["narrow"]["svg"]
-    assert (page["wide"]["width"], page["narrow"]["width"]) == (672, 346)
-    assert "png" not in page["narrow"]
-    assert b64decode(page["pdf"]).startswith(b"%PDF")
+    assert bundle["image/svg+xml"].encode() == bars().written("svg")
 
 
 def test_what_would_be_a_heavy_svg_is_a_png(monkeypatch):
-    monkeypatch.setenv(sheet.FOR_PAGE, "1")
     monkeypatch.setattr(sheet, "HEAVY", 1000)
-    page = shown(bars(), monkeypatch)[sheet.MIME]
-    assert "svg" not in page["wide"]
-    assert page["wide"]["heavy"].startswith("<?xml")  # for whoever teaches
-    assert set(page["narrow"]) == {"width", "height", "png"}
-    assert b64decode(page["narrow"]["png"]).startswith(b"\x89PNG")
+    bundle = shown(bars(), monkeypatch)
+    assert set(bundle) == {"text/plain", "image/png"}
+    assert b64decode(bundle["image/png"]).startswith(b"\x89PNG")
 
 
 # What can be seen

@@ -12,7 +12,6 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
 from nmpcrl.report.figures.axes import below, draw_task, map_grid
-from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import (
     INK,
     MEANINGS,
@@ -30,7 +29,7 @@ from nmpcrl.report.figures.style import (
 @page
 def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
     """The closed-loop trajectory without noise, and some of the plans behind it."""
-    figure, axes = subplots(height=3.7, tall=2.7)
+    figure, axes = subplots(height=3.1)
     draw_task(axes, task)
     axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="trajectory without noise")
     for i, plan in enumerate(plans):
@@ -115,8 +114,6 @@ def theta_effects(
 ) -> Figure:
     """One panel a parameter: the trajectory of theta_init, and of two other values.
 
-    On a low sheet there are those four that bend it most.
-
     Args:
         task: of the rollouts.
         middle: the closed loop of theta_init.
@@ -127,9 +124,7 @@ def theta_effects(
         for name, changes in others.items()
     }
     most = sorted(moved, key=lambda name: -moved[name])
-    if sheet().low:
-        others = {name: others[name] for name in others if name in most[:4]}
-    figure, maps, grid = map_grid(list(others), 1.5, 0.5, low=2)
+    figure, maps, grid = map_grid(list(others), 1.5, 0.5)
     for name, changes in others.items():
         axes = maps[name]
         draw_task(axes, task, labels=False)
@@ -154,7 +149,7 @@ def theta_effects(
 @page
 def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Figure:
     """The trajectory in the box of departure A, and in the box as the paper prints it."""
-    figure, axes = subplots(height=3.9, tall=2.9)
+    figure, axes = subplots(height=3.2)
     draw_task(axes, task)
     axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
     axes.annotate(
@@ -192,7 +187,7 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
         theta_c: the values tried, the first one that of theta_init, shape (k,).
         costs: noise-free cost of each; infinite where a solve failed, shape (k,).
     """
-    figure, (left, right) = subplots(1, 2, height=3.5)
+    figure, (left, right) = subplots(1, 2, across=1, tall=5.4)
     kept = task.discs[2][0] / 2  # centre distance at which Xi = 0 [m]
     distance = np.linspace(0.9 * kept, 1.25 * kept, 200)
     penalty = task.penalty * np.maximum(0, 1 - (distance / kept) ** 2 + task.margin)

@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Vector
 from nmpcrl.report.figures.style import (
@@ -95,6 +96,7 @@ def kink(offsets: Vector, values: Vector, edge: float, slopes: tuple[float, floa
         slopes: dV/dtheta_c on the left and on the right of it.
     """
     figure, axes = subplots(height=3.3)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     middle = np.interp(0, offsets, values)
     axes.plot(offsets, values - middle, "o", color=INK, ms=4, label="solved")
     for slope, side, color, line in zip(slopes, (-1, 1), (TEAL, WINE), ("--", "-"), strict=True):

@@ -31,7 +31,7 @@ NAMES = {  # of what the learners are compared with, and how far above its line 
 @page
 def courses(found: Runs) -> Figure:
     """Cost of a training step, by arm: interquartile mean of the seeds, with its interval."""
-    figure, axes = subplots(height=3.6, tall=3.2)
+    figure, axes = subplots(height=3.4)
     for arm, look in ARM_LOOKS.items():
         runs = np.array([*found.courses.costs[found.courses.arm == arm]])
         steps = WINDOW * (np.arange(runs.shape[1]) + 0.5)
@@ -52,7 +52,7 @@ def courses(found: Runs) -> Figure:
 @page
 def ends(found: Runs) -> Figure:
     """Cost without noise on the action of each seed's last theta, beside what is possible."""
-    figure, axes = subplots(height=3.4, tall=3.4)
+    figure, axes = subplots(height=3.4)
     for place, (arm, costs) in enumerate(found.tests.items()):
         look, shown = ARM_LOOKS[str(arm)], np.minimum(np.sort(costs.to_numpy()), MOST)
         where = place + jitter(len(costs), 0.3)
@@ -91,7 +91,7 @@ def _first(found: Runs) -> str:
 @page
 def spreads(found: Runs) -> Figure:
     """J of each seed by solver and order, and how a difference in theta grows."""
-    figure, (left, right) = subplots(1, 2, height=3.2)
+    figure, (left, right) = subplots(1, 2, across=1, tall=5.2)
     table = found.spreads
     columns = {
         "mpcrl,\nIpopt": table[PEERS[0]],
@@ -128,7 +128,7 @@ def gains(paths: Mapping[str, Vector], truth: Vector) -> Figure:
         paths: by learner, shape (episodes + 1, 2).
         truth: the best K, shape (2,).
     """
-    figure, axes = subplots(height=3.2, tall=3.0)
+    figure, axes = subplots(height=3.1)
     for name, path in paths.items():
         look = ARM_LOOKS.get(name, OWN["LSTD-Q, batches of 20"])
         axes.plot(*path.T, color=look.color, linestyle=look.linestyle, linewidth=1.2)

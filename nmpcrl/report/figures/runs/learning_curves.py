@@ -21,7 +21,6 @@ from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.report.figures.axes import label_panel, legend
 from nmpcrl.report.figures.panels import part, ranges, sourced
-from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import BAND, SUBTITLE, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.store import Runs
@@ -84,14 +83,9 @@ def judged(summary: RunSummary) -> tuple[Vector, Vector]:
 
 @page
 def _learning_curves(drawn: Evidence, title: str) -> Figure:
-    """Cost of each training episode above, without noise below; a column a reading.
-
-    On a low sheet there is the cost without noise alone.
-    """
+    """Cost of each training episode above, without noise below; a column a reading."""
     learners, decays = drawn.summaries.values_of("learner"), drawn.summaries.values_of("decay")
     rows = {"cost of a training episode\n/ at the start, without noise": trained}
-    if sheet().low:
-        rows.clear()
     rows["cost without noise\n/ at the start"] = judged
     options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, axes = subplots(len(rows), len(decays), 5.4, **options)

@@ -12,7 +12,6 @@ from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import draw_task, logarithmic_if_wide
-from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
@@ -36,11 +35,10 @@ from nmpcrl.study.records import Column, Records
 
 HEIGHT = 8.8  # inches
 EXTENT = (-2.6, 5.4)  # of the map [m], where nothing stands beyond
-BELOW = {False: 0.0, True: 1.4}  # more of the map [m], for its legend: wide and narrow
-ABOVE = {False: 0.2, True: 0.45}  # of the heights of theta, for their legend: wide and narrow
+BELOW = 2.4  # more of the map [m], for its legend
+ABOVE = 1.1  # of the heights of theta, for their legend
 PANELS = (("map", "map"), ("theta", "step"), ("noisy", "noise-free"))
 ROWS = (1.25, 1, 1)  # relative heights
-TALL = (2.9, 2.3, 1.9, 1.9, 1.9)  # heights [inches] of panels below each other
 NAMED = 4  # components of theta that are named, those that move most; the others are grey
 WIDE = 10  # what an axis goes up to that is linear
 MOVES = 1e-3  # as a share of the largest movement; what moves less is grey
@@ -55,7 +53,7 @@ def run_page(records: Records, frozen: Records | None = None) -> Figure:
         records: the run.
         frozen: its frozen arm, drawn beside its costs.
     """
-    figure, panels = mosaic(PANELS, ROWS, HEIGHT, TALL)
+    figure, panels = mosaic(PANELS, ROWS, HEIGHT)
     _map(panels["map"], records)
     _theta(panels["theta"], records)
     _steps(panels["step"], records)
@@ -82,7 +80,7 @@ def _map(axes: Axes, records: Records) -> None:
             axes.plot(*path[-1:, :2].T, look.marker, color=style["color"], markersize=4)
     y = [task.start[1], task.target[1], *task.discs[1]]
     low, high = min(EXTENT[0], min(y) - 0.6), max(EXTENT[1], max(y) + 0.6)
-    low -= BELOW[sheet().narrow]
+    low -= BELOW
     axes.set(xlim=(task.lower[0] - 0.5, task.upper[0]), ylim=(low, high))
     axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.legend(loc="lower left")
@@ -119,8 +117,8 @@ def _theta(axes: Axes, records: Records) -> None:
         axes.set_yscale("symlog", linthresh=1, linscale=3)
         axes.yaxis.get_major_locator().set_params(numticks=7)  # type: ignore[call-arg]
     if named:
-        axes.margins(y=ABOVE[sheet().narrow])
-        axes.legend(loc="upper center", ncols=NAMED, handlelength=1.5, columnspacing=1)
+        axes.margins(y=ABOVE)
+        axes.legend(loc="upper center", ncols=2, handlelength=1.5, columnspacing=1)
 
 
 def _steps(axes: Axes, records: Records) -> None:

@@ -12,7 +12,6 @@ from nmpcrl import Vector
 from nmpcrl.analysis.trap import Stand, stretch
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import MAPS, draw_task, over_episodes
-from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import (
     BAND,
     INK,
@@ -28,7 +27,7 @@ from nmpcrl.report.figures.style import (
 from nmpcrl.studies.population import STANDING
 
 PANELS = tuple(("map", name) for name in ("value", "delta", "theta_c", "cost"))
-ROWS, HEIGHT, TALL = (1.4, 1, 1, 1), 5.6, (2.9, 1.8, 1.4, 1.4, 1.4)
+ROWS, HEIGHT = (1.4, 1, 1, 1), 5.6
 MOMENTS = (("#0072B2", "-"), ("#B37A00", "--"), (WINE, "-."))  # of a trajectory and its clearances
 BEST: dict[str, Any] = {"color": TEAL, "linestyle": "-"}
 FIRST: dict[str, Any] = {"color": WINE, "linestyle": "--"}
@@ -59,7 +58,7 @@ def trap(task: Task, stands: Sequence[Stand], moments: Sequence[int]) -> Figure:
         stands: of `analysis.trap.stands`.
         moments: which three of them the map shows, the last two of a robot that stands.
     """
-    figure, panels = mosaic(PANELS, ROWS, HEIGHT, TALL)
+    figure, panels = mosaic(PANELS, ROWS, HEIGHT)
     _map(panels["map"], task, [stands[k] for k in moments])
     there = stretch(stands, STANDING)
     along = [one.episode for one in stands]
@@ -97,9 +96,9 @@ def cliffs(
         best: theta_c of the best theta, by layout.
         raised: the largest share of the best cost that 2 % more of it adds.
     """
-    columns = min(MAPS[sheet().narrow], len(costs))
+    columns = min(MAPS, len(costs))
     rows = -(-len(costs) // columns)
-    options: dict[str, Any] = {"sharex": True, "squeeze": False, "across": columns}
+    options: dict[str, Any] = {"sharex": True, "squeeze": False}
     figure, axes = subplots(rows, columns, 1.9 * rows + 0.6, **options)
     for panel, (layout, (along_best, along_init)) in zip(axes.flat, costs.items(), strict=False):
         panel.plot(grid, along_init / 1000, label=r"all else as $\theta_\mathrm{init}$", **FIRST)

@@ -21,7 +21,7 @@ OWN = (Look(WINE, (0, (3, 1, 1, 1)), "p"), Look(TEAL, (0, (6, 2)), "h"))  # of l
 @page
 def costs(rows: pd.DataFrame) -> Figure:
     """Cost without noise over training, one line a run; `rows` are those of `analysis.trials`."""
-    figure, axes = subplots(height=3.3, tall=3.0)
+    figure, axes = subplots(height=3.1)
     looks = _looks(rows.learner.unique())
     for name, look in looks.items():
         for i, (_, run) in enumerate(rows[rows.learner == name].groupby("seed")):
@@ -48,7 +48,7 @@ def learned(
         courses: the state over steps without noise, by what to call it.
         names: of the parameter and the state, with units.
     """
-    figure, (left, right) = subplots(1, 2, height=3.0)
+    figure, (left, right) = subplots(1, 2, across=1, tall=4.8)
     left.axhline(truth, **LIMIT)
     left.plot(values, color=TEAL)
     left.set(xlabel="learning step", ylabel=names[0], title="Parameter (dashed: the plant's)")
@@ -67,7 +67,7 @@ def learned(
 @page
 def shares(verdicts: Mapping[Any, Verdict], xlabel: str) -> Figure:
     """Share of yes with its interval for each value of what a claim may depend on."""
-    figure, axes = subplots(height=3.0, tall=2.8)
+    figure, axes = subplots(height=2.9)
     known = {name: v for name, v in verdicts.items() if v.share is not None}
     for i, verdict in enumerate(known.values()):
         axes.vlines(i, *(verdict.interval or (np.nan, np.nan)), color=INK, lw=1.4)

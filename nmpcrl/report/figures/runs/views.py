@@ -10,7 +10,6 @@ from matplotlib.patches import Circle
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.report.figures.axes import below
-from nmpcrl.report.figures.sheet import Drawn, sheet
 from nmpcrl.report.figures.style import (
     BAND,
     INK,
@@ -34,16 +33,15 @@ ROOM = 2.0  # of the map, above and below every way [m]
 
 @page
 def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
-    """A map for each view, and how near the robot comes to an obstacle; all of it plays.
+    """A map for each view, and how near the robot comes to an obstacle.
 
-    What stands still is the moment at which a robot is deepest in an obstacle, or nearest to one.
+    The maps show the moment at which a robot is deepest in an obstacle, or nearest to one.
 
     Args:
         motions: of the obstacles.
         seen: by view, the episode in which the obstacles were seen so.
     """
-    figure, panels = mosaic(PANELS, (1.6, 1), min(4.6, sheet().height), (2.1, 2.1, 2.1, 1.7))
-    assert isinstance(figure, Drawn)
+    figure, panels = mosaic(PANELS, (1.6, 1), 4.0)
     at = centres(motions, np.arange(paper.STEPS))
     near = {view: nearest(one, motions) for view, one in seen.items()}
     moment = int(np.argmin(near[min(near, key=lambda view: near[view].min())]))
@@ -52,7 +50,7 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
     low, high = every.min(axis=0) - [AROUND, ROOM], every.max(axis=0) + [AROUND, ROOM]
     for view in VIEWS:
         panels[view].set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        _map(figure, panels[view], at, ways[view], moment, view)
+        _map(panels[view], at, ways[view], moment, view)
     _curves(figure, panels["near"], near, moment)
     counts = {view: seen[view].contacts.inside for view in VIEWS}
     known, extrapolated, frozen = counts.values()
@@ -63,32 +61,31 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
     )
 
 
-def _map(figure: Drawn, axes: Axes, at: Matrix, way: Matrix, moment: int, view: str) -> None:
+def _map(axes: Axes, at: Matrix, way: Matrix, moment: int, view: str) -> None:
     """Where everything is at one moment, and its way."""
     radius, moment = TASK.robot_diameter / 2, min(moment, len(way) - 1)
     for j in range(at.shape[1]):
         axes.plot(*at[:, j].T, color=QUIET, linewidth=0.8, zorder=1)
         disc = Circle(at[moment, j], CLEARANCE / 2 - radius, fc="#CFCFCF", ec="#8A8A8A", zorder=2)
-        figure.moves(axes, axes.add_patch(disc), at[:, j], moment)
+        axes.add_patch(disc)
     axes.plot(*way.T, **VIEW_LINES[view], linewidth=1.8, zorder=3)
     robot = Circle(way[moment], radius, fc=VIEW_LINES[view]["color"], ec="white", lw=0.8, zorder=4)
-    figure.moves(axes, axes.add_patch(robot), way, moment)
+    axes.add_patch(robot)
     axes.plot(*TASK.target[:2], "*", color=INK, ms=9, zorder=3)
-    first = view == VIEWS[0] or sheet().narrow
+    first = view == VIEWS[0]
     axes.set(xlabel="x [m]", ylabel="y [m]" if first else "")
     axes.tick_params(labelleft=first)
     axes.set_title(VIEW_TITLES[view], **SUBTITLE)
 
 
-def _curves(figure: Drawn, axes: Axes, near: Mapping[str, Vector], moment: int) -> None:
+def _curves(figure: Figure, axes: Axes, near: Mapping[str, Vector], moment: int) -> None:
     """The distance to the nearest obstacle over time."""
     seconds = PERIOD * np.arange(paper.STEPS)
     axes.axhspan(min(one.min() for one in near.values()) - 0.1, 0, **BAND)
     for view, distances in near.items():
         points, now = np.c_[seconds[: len(distances)], distances], min(moment, len(distances) - 1)
         axes.plot(*points.T, label=VIEW_TITLES[view], **VIEW_LINES[view])
-        (dot,) = axes.plot(*points[now], "o", color=VIEW_LINES[view]["color"], ms=5, clip_on=False)
-        figure.moves(axes, dot, points, now)
+        axes.plot(*points[now], "o", color=VIEW_LINES[view]["color"], ms=5, clip_on=False)
     axes.set(xlabel="time [s]", ylabel="to the nearest\nobstacle [m]", xlim=(0, seconds[-1]))
     axes.set_title("grey: inside an obstacle", **SUBTITLE)
     axes.margins(y=0)

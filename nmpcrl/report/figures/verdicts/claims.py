@@ -156,7 +156,7 @@ def theorem(
     assumptions: Iterable[Assumption], verdict: Verdict, records: Records, curvature: Curvature
 ) -> Figure:
     """C8: how dependent the transitions of a run of GES are, and how large the dropped term is."""
-    figure, (lags, dropped) = subplots(1, 2, 3.0)
+    figure, (lags, dropped) = subplots(1, 2, across=1, tall=4.8)
     delta = records.steps["delta"][np.isfinite(records.steps["delta"])]
     steps = np.arange(1, min(LAGS, delta.size // 2) + 1)
     lags.bar(steps, [np.corrcoef(delta[:-k], delta[k:])[0, 1] for k in steps], color=INK)
@@ -187,7 +187,7 @@ def gains(found: Evidence, verdict: Verdict) -> Figure:
 @page
 def learners(found: Evidence) -> Figure:
     """All learners: interquartile mean of the final cost, and how many runs save how much."""
-    figure, (middles, profile) = subplots(1, 2, 3.6)
+    figure, (middles, profile) = subplots(1, 2, across=1, tall=5.4)
     costs = {name: _final_costs(found, name) for name in found.summaries.values_of("learner")}
     means = {name: interquartile_mean(*cost) for name, cost in costs.items()}
     placed = logarithmic(middles, "x", np.concatenate([cost for cost, _ in costs.values()]), 1.0)

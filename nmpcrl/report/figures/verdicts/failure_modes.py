@@ -27,7 +27,7 @@ PATTERNS = (  # colour and hatching of what did not: of mechanisms, and of endin
     (("#5C0F3A", ""), (WINE, "//"), ("#A0487A", "--"), ("#BC6F9A", "\\\\"), (WINE, "xx")),
     (("#0B4744", ""), (TEAL, "||"), ("#3D8F8A", "++"), ("#0B4744", "x"), (TEAL, "-")),
 )
-BELOW: dict[str, Any] = {"bbox_to_anchor": (0.5, 0), "borderaxespad": 3.2, "ncols": 2}
+BELOW: dict[str, Any] = {"bbox_to_anchor": (0.5, 0), "borderaxespad": 3.2, "ncols": 3}
 STOPPED = "stopped in training"
 
 
@@ -35,7 +35,8 @@ STOPPED = "stopped in training"
 def reasons(found: Evidence) -> Figure:
     """How many runs of each learner met which mechanism, and how their last rollouts ended."""
     moved = found.runs[found.runs.learner != "frozen"]
-    figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
+    tall = 2 * (1.5 + 0.3 * moved.learner.nunique())
+    figure, axes = subplots(1, 2, across=1, tall=tall, sharey=True)
     ends = moved.ending.mask(moved.wrong == Failure.STOPPED, STOPPED)
     arrived, *worse = Ending
     kinds = (moved.mechanism, (*Mechanism, WELL)), (ends, (STOPPED, *worse, arrived))

@@ -116,7 +116,7 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
         values: of each claim's measure, over the main table.
         mark: where the runs come from.
     """
-    figure, panels, grid = map_grid(list(values), 2.1, 0.4, low=4, sharex=False, tall=5.6)
+    figure, panels, grid = map_grid(list(values), 1.7, 0.6, sharex=False)
     for claim, measured in values.items():
         axes = panels[claim]
         asked = BY_RUNS[claim]

@@ -62,7 +62,7 @@ def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcom
         verdicts: the outcomes of A to F by claim, for the title.
     """
     height = ROW * len(found) + 1.3
-    figure, axes = subplots(height=height, tall=height + 0.5)  # its legend has a line more
+    figure, axes = subplots(height=height + 0.3)
     for y, row in enumerate(found.itertuples()):
         colour, mark = LOOK.get(row.outcome, OTHER)
         expected = EXPECTED[str(row.claim)]
@@ -98,7 +98,7 @@ def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series) -> F
         runs: of ES, of `rows.table`.
         closes: theta_c at which the first gap of the first trajectory closes, a run's layout each.
     """
-    figure, (ends, areas) = subplots(1, 2, ROW * len(scores) + 1.3, tall=5.0)
+    figure, (ends, areas) = subplots(1, 2, across=1, tall=ROW * len(scores) + 3.9)
     _ends(ends, runs, closes)
     below(figure, *ends.get_legend_handles_labels())
     order = [*scores.auc.map(lambda one: one.value).sort_values(ascending=False).index]

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import WHOLE
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.report.figures.sheet import in_words, sheet
+from nmpcrl.report.figures.sheet import in_words
 from nmpcrl.report.figures.style import headed, marked, page, subplots
 from nmpcrl.report.tables import WORDS
 
@@ -24,47 +24,37 @@ FILLS = {  # with the colour of the word; the darker, the more is left of the cl
     UNDECIDABLE: ("white", "0.45"),
 }
 SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
-ABREAST = 3  # claims side by side on a narrow sheet
 LETTERS = -2.15  # where the letters of the departures stand, in widths of a cell
-FOLD = {False: 13, True: 10}  # characters of a line above a column, wide and narrow
+FOLD = 10  # characters of a line above a column
 SMALL: dict[str, Any] = {"va": "center", "fontsize": "small"}
-FEW_ROWS = 10  # of the map on a low sheet
 
 
 @page
 def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
     """What becomes of each claim in each row, framed where it is not what it is compared with.
 
-    On a low sheet the rows are those whose changes chance explains least.
-
     Args:
         judged: of `robustness_map`.
         mark: where the runs come from.
     """
     finding = _changed(judged)
-    if sheet().low:
-        judged = _surest(judged)
     claims, rows = list(judged.claim.unique()), list(judged.variant.unique())
     letters = dict(zip(judged.variant, judged.departure, strict=True))
     height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
     last = max(height.values(), default=0.0)
-    side = max(1, ABREAST if sheet().narrow else len(claims))
-    parts = [claims[i : i + side] for i in range(0, len(claims), side)] or [[]]
-    tall = len(parts) * (0.2 * last + 1.0) + 0.6
-    figure, panels = subplots(len(parts), 1, 0.22 * last + 1.5, squeeze=False, tall=tall)
-    for axes, part in zip(panels.flat, parts, strict=True):
-        for cell in judged[judged.claim.isin(part)].to_dict("records"):
-            _cell(axes, part.index(cell["claim"]), height[cell["variant"]], cell)
-        for row, y in height.items():
-            axes.text(-0.1, y, named(row), ha="right", **SMALL)
-            if height[row] == min(height[one] for one in rows if letters[one] == letters[row]):
-                axes.text(LETTERS, y, letters[row], ha="left", **SMALL)
-        axes.text(LETTERS, -0.8, "departure", ha="left", **(SMALL | {"va": "bottom"}))
-        for i, claim in enumerate(part):
-            head = f"{claim}\n{_folded(BY_RUNS[claim].short, FOLD[sheet().narrow])}"
-            axes.text(i + 0.5, -0.8, head, ha="center", **(SMALL | {"va": "bottom"}))
-        axes.set(xlim=(LETTERS, side), ylim=(last + 0.7, -5.2))
-        axes.set_axis_off()
+    figure, axes = subplots(height=0.22 * last + 1.5)
+    for cell in judged.to_dict("records"):
+        _cell(axes, claims.index(cell["claim"]), height[cell["variant"]], cell)
+    for row, y in height.items():
+        axes.text(-0.1, y, named(row), ha="right", **SMALL)
+        if height[row] == min(height[one] for one in rows if letters[one] == letters[row]):
+            axes.text(LETTERS, y, letters[row], ha="left", **SMALL)
+    axes.text(LETTERS, -0.8, "departure", ha="left", **(SMALL | {"va": "bottom"}))
+    for i, claim in enumerate(claims):
+        head = f"{claim}\n{_folded(BY_RUNS[claim].short, FOLD)}"
+        axes.text(i + 0.5, -0.8, head, ha="center", **(SMALL | {"va": "bottom"}))
+    axes.set(xlim=(LETTERS, max(1, len(claims))), ylim=(last + 0.7, -5.2))
+    axes.set_axis_off()
     return marked(headed(figure, finding), mark)
 
 
@@ -73,13 +63,6 @@ def named(row: str) -> str:
     for word, symbol in SYMBOLS.items():
         row = row.replace(word, symbol)
     return row
-
-
-def _surest(judged: pd.DataFrame) -> pd.DataFrame:
-    """The whole table, and the rows with the changes that chance explains least."""
-    changed = judged[judged.changes.astype(bool)].sort_values("p", kind="stable")
-    kept = [WHOLE, *changed.variant.unique()[: FEW_ROWS - 1]]
-    return judged[judged.variant.isin(kept)]
 
 
 def _heights(letters: list[str]) -> list[float]:

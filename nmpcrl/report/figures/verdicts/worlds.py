@@ -66,7 +66,9 @@ def policies(costs: pd.DataFrame, met: pd.DataFrame) -> Figure:
         costs: of `worlds.means`, a row a scenario and a column an arm.
         met: the share of the seeds in which the robot gets into an obstacle, in the same form.
     """
-    figure, (left, right) = subplots(1, 2, ROW * len(POLICIES) + 1.5, sharey=True, tall=5.0)
+    figure, (left, right) = subplots(
+        1, 2, across=1, sharey=True, tall=2 * ROW * len(POLICIES) + 2.2
+    )
     ratios = costs.div(costs["known init"], axis=0)
     for k, view in enumerate(VIEWS):
         place = np.arange(len(POLICIES)) + 0.22 * (k - 1)
@@ -105,7 +107,7 @@ def survival(crowding: pd.Series, met: pd.DataFrame, correlation: float) -> Figu
         met: as `policies` has it.
         correlation: of the ranks of crowding and of states inside, with extrapolation.
     """
-    figure, panels = subplots(1, 2, 3.1, sharey=True, tall=4.8)
+    figure, panels = subplots(1, 2, across=1, sharey=True, tall=4.8)
     thirds = pd.qcut(crowding.rank(method="first"), 3, labels=False)
     middles = crowding.groupby(thirds).median()
     for axes, how in zip(panels, ("init", "ES"), strict=True):

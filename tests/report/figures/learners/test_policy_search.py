@@ -30,5 +30,9 @@ def test_the_trajectories_count_who_arrives_and_cross_out_who_does_not():
     figure = policy_search.trajectories(rollouts)
     assert figure.get_suptitle().startswith("Arrived, of 3 layouts: 2 after learning, 2 with")
     assert figure.get_suptitle().endswith("3 at best")
-    crosses = [sum(line.get_marker() == "X" for line in axes.get_lines()) for axes in figure.axes]
-    assert crosses == [0, 1, 1]
+    maps = [axes for axes in figure.axes if axes.get_visible()]
+    assert [sum(line.get_marker() == "X" for line in axes.get_lines()) for axes in maps] == [
+        0,
+        1,
+        1,
+    ]

@@ -9,7 +9,6 @@ import pytest
 from legibility import flaws
 from matplotlib import pyplot as plt
 
-from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.runs.run import run_page
 from nmpcrl.report.run import finding, verdict
 from nmpcrl.study import Experiment, run
@@ -62,18 +61,12 @@ def test_every_run_has_a_page_whose_titles_state_what_is_seen(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_any_run_can_be_read_wide_and_on_a_telephone(known, arms, name):
-    wide = run_page(known[name], arms(name))
-    narrow = wide.again(sheet.NARROW)
-    assert not flaws(wide)
-    assert not flaws(narrow)
-    assert titles(narrow) == titles(wide)
-    assert [axes.get_subplotspec().rowspan.start for axes in narrow.axes] == [0, 1, 2, 3, 4]
-    assert {axes.get_subplotspec().colspan.stop for axes in narrow.axes} == {1}
+def test_any_run_can_be_read(known, arms, name):
+    assert not flaws(run_page(known[name], arms(name)))
 
 
-def test_a_legend_of_a_narrow_page_lies_on_no_obstacle_and_no_line(known):
-    figure = run_page(known["ES"]).again(sheet.NARROW)
+def test_a_legend_lies_on_no_obstacle_and_no_line(known):
+    figure = run_page(known["ES"])
     figure.draw_without_rendering()
     on_map, on_theta = (axes.get_legend().get_window_extent() for axes in figure.axes[:2])
     obstacles = [patch.get_window_extent() for patch in figure.axes[0].patches]

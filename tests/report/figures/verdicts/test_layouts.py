@@ -14,7 +14,6 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.robustness import robustness_map
-from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.verdicts import layouts as figures
 from nmpcrl.report.figures.verdicts import robustness as maps
 from nmpcrl.study import Experiment, design, paper
@@ -115,18 +114,7 @@ def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
     arrows = [text for text in written(figure) if "→" in text]
     assert len(arrows) == changes
     assert "yes → no" in arrows
-    assert "yes → no" in written(figure.again(sheet.NARROW))
     assert title(figure).startswith(f"{changes} of ")
-
-
-def test_on_a_slide_the_map_has_the_rows_whose_changes_chance_explains_least(changing):
-    found, rows = changing
-    figure = maps.verdict_map(rows, found.mark)
-    low = written(figure.again(sheet.SLIDE))
-    surest = rows[rows.changes.astype(bool)].sort_values("p", kind="stable").variant.iloc[0]
-    assert maps.named(surest) in low
-    assert len(low) < len(written(figure))
-    assert title(figure.again(sheet.SLIDE)) == title(figure)
 
 
 def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(changing):

@@ -7,7 +7,6 @@ import pytest
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
-from nmpcrl.report.figures.sheet import NARROW
 from nmpcrl.report.figures.verdicts import population as figures
 from nmpcrl.studies.difficulty import MEASURES, PILOT
 from nmpcrl.studies.population import EXPECTED, shares
@@ -41,10 +40,10 @@ def test_the_title_counts_the_verdicts_that_stand_and_others_have_none():
     assert drawn == [marks[PARTLY], "|", marks[NOT], "|", marks[REPRODUCED]]
 
 
-def test_no_two_claims_of_a_narrow_sheet_are_written_over_each_other():
+def test_no_two_claims_are_written_over_each_other():
     found = shares(where(**dict(zip(EXPECTED, cycle((0, 20, 40)), strict=False))))
     assert found.outcome.nunique() == 3  # each has its entry in the legend
-    figure = figures.shares(found, found, {}).again(NARROW)
+    figure = figures.shares(found, found, {})
     figure.draw_without_rendering()  # lays it out
     boxes = [text.get_window_extent() for text in figure.axes[0].get_yticklabels()]
     assert len(boxes) == len(EXPECTED)

@@ -1,1 +1,0 @@
-"""The built book as one PDF."""
