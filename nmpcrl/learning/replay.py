@@ -60,7 +60,7 @@ class Replaying:
         data = {name: names.part(name, before.data).reshape(-1, *names[name]) for name in names}
         solution = self.nmpc.solve(old.state, theta, before, action, data=data)
         again = replace(old, solution=solution)
-        after = learner.bootstrap(again, theta)
+        after: Any = learner.bootstrap(again, theta)  # a solve
         return again, td_error(old.cost, learner.gamma, solution.value, after.value), after
 
 
