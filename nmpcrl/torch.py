@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from nmpcrl.control import DerivativeError, Nmpc
+from nmpcrl.control import Nmpc
 
 
 class Layer(torch.nn.Module):
@@ -96,26 +96,14 @@ class _Solve(torch.autograd.Function):
             data=dict(zip(names, data, strict=True)),
             threads=layer.threads,
         )
-        ctx.nmpc, ctx.batch, ctx.names = layer.nmpc, batch, names
-        ctx.shapes = [one.shape for one in arrays]
+        ctx.nmpc, ctx.batch, ctx.names, ctx.fixed = layer.nmpc, batch, names, len(asked) > 2
         return torch.tensor(batch.value), torch.tensor(batch.inputs)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, of_value: Tensor, of_plan: Tensor) -> tuple[Any, ...]:
-        """One backward sweep for each state that was solved."""
-        found, names = [np.zeros(shape) for shape in ctx.shapes], ctx.names
-        weights = zip(of_value.tolist(), of_plan.numpy(), strict=True)
-        for k, (solution, (value, inputs)) in enumerate(zip(ctx.batch, weights, strict=True)):
-            if solution is None:
-                continue
-            try:
-                rates = ctx.nmpc.gradient(solution, value, inputs)
-            except DerivativeError:
-                rates = ctx.nmpc.gradient(solution, value)
-            parts = [rates.state, rates.theta, rates.action, *map(rates.data.get, names)]
-            if len(parts) > len(found):  # no action was given
-                del parts[2]
-            for one, part in zip(found, parts, strict=True):
-                one[k] = part
-        return None, None, *(torch.from_numpy(one) for one in found)
+        """One backward sweep for all states that were solved."""
+        rates = ctx.nmpc.gradient(ctx.batch, of_value.numpy(), of_plan.numpy())
+        given = [rates.state, rates.theta, *[rates.action] * ctx.fixed]
+        found = (*given, *map(rates.data.get, ctx.names))
+        return None, None, *map(torch.from_numpy, found)

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 
@@ -33,12 +33,17 @@ class Backward(Sensitivity):
     def __init__(self, ocp: Ocp) -> None:
         super().__init__(replace(ocp, theta=ocp.parameters))
 
-    def along(self, z: Vector, p: Vector, lam: Vector, step: Vector, weights: Vector) -> Vector:
-        """w' dz/dp from the step of z and lam that solves K step + w = 0: L_p along it.
+    def gradient(self, z: Matrix, p: Matrix, lam: Matrix) -> Matrix:
+        """dV/dp, L_p, a column a solution."""
+        found: Matrix = self._value_and_gradient(z, p, lam)[1].full()
+        return found
 
-        In the step, the multipliers of x_0 = s and of a given u_0 are 0: those are found here.
+    def along(self, z: Matrix, p: Matrix, lam: Matrix, step: Matrix, weights: Matrix) -> Matrix:
+        """w' dz/dp from the steps of z and lam that solve K step + w = 0: L_p along them.
+
+        In a step, the multipliers of x_0 = s and of a given u_0 are 0: those are found here.
         """
-        found: Vector = self._along(z, p, lam, step, weights).full().ravel()
+        found: Matrix = self._along(z, p, lam, step, weights).full()
         return found
 
     @cached_property

@@ -228,10 +228,10 @@ class Nmpc(Described):
 
     def gradient(
         self,
-        solution: Solution,
-        value: float = 1.0,
-        inputs: Matrix | None = None,
-        states: Matrix | None = None,
+        solution: Solution | Batch,
+        value: Any = 1.0,
+        inputs: Any = None,
+        states: Any = None,
     ) -> Gradient:
         """The derivatives in state, theta, a given u_0 and data of J, a sum over the solution.
 
@@ -240,8 +240,11 @@ class Nmpc(Described):
         entry of the plan: du/ds, du/dtheta and du/dd, at kinks as in `policy_jacobian`. By riccati
         that is a sweep, compiled for the problem where it is first asked for.
 
+        Of a batch of B, weights and derivatives have a first axis of B; its derivatives are 0
+        where no optimum was found, and the value's alone where the plan has none.
+
         Args:
-            solution: where.
+            solution: where, or a batch, for a fourth of the time each.
             value: the weight of the value.
             inputs: the weights of u_0, ..., u_{N-1}, shape (N, m); 0 if absent.
             states: the weights of x_0, ..., x_N, shape (N + 1, n); 0 if absent.
@@ -249,7 +252,14 @@ class Nmpc(Described):
         Raises:
             DerivativeError: the plan has no derivative; V always has one.
         """
-        return self._variant(solution).gradient(solution, value, inputs=inputs, states=states)
+        weights = {"inputs": inputs, "states": states}
+        if isinstance(solution, Batch):
+            variant = self._fixed if solution.ocp.fixed_action.size else self._free
+            return variant.gradient([*solution], value, alone=False, **weights)
+        weights = {k: None if one is None else np.asarray(one)[None] for k, one in weights.items()}
+        found = self._variant(solution).gradient([solution], value, alone=True, **weights)
+        data = {name: one[0] for name, one in found.data.items()}
+        return Gradient(found.state[0], found.theta[0], found.action[0], data)
 
     def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.

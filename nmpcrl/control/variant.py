@@ -1,6 +1,6 @@
 """Eq. (2) with u_0 free or fixed: its OCP, its solver and its derivatives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -26,38 +26,63 @@ class Variant:
         self.solver = solver.prepare(self.units.ocp)
         self.solve = self.solver.solve if self.units.trivial else self._solve_in_units
 
-    def gradient(self, solution: Solution, value: float, **weights: Matrix | None) -> Gradient:
-        """See `Nmpc.gradient`; `weights` are those of inputs and states."""
-        ocp, units, of = self.ocp, self.units, self.ocp.problem
-        inside, w = units.inside(solution), np.zeros(ocp.lower.size)
-        given = inside.primal, inside.parameters, inside.constraint_duals
-        found = value * self._backward.value_and_gradient(*given)[1]
+    def gradient(
+        self, solutions: Sequence[Solution | None], value: Any, *, alone: bool, **weights: Any
+    ) -> Gradient:
+        """See `Nmpc.gradient`, of a batch; `weights` are those of inputs and states."""
+        ocp, units, of, count = self.ocp, self.units, self.ocp.problem, len(solutions)
+        w = np.zeros((count, ocp.lower.size))
         for name, unit in (("inputs", units.inputs), ("states", units.states)):
-            place, one = getattr(ocp, name), weights[name]
-            if one is not None and np.shape(one) != place.shape:
-                raise ValueError(f"{name} has shape {np.shape(one)}; it must be {place.shape}")
-            w[place] = 0.0 if one is None else one * unit
-        if w.any():
-            step = self.compiled(Compiled.adjoint, solution, w)
-            if step is None:
-                found += w @ self.dense(Sensitivity.plan, solution, of=self._backward)
-            else:
-                found += self._backward.along(*given, step, w)
-        sizes = (
-            of.states,
-            of.names.size,
-            ocp.fixed_action.size,
-            of.data_names.size * len(ocp.states),
-        )
-        state, theta, action, data = np.split(found, np.cumsum(sizes)[:-1])
-        data = data.reshape(len(ocp.states), -1)
+            shape, one = (count, *getattr(ocp, name).shape), weights[name]
+            if one is not None and np.shape(one) != shape:
+                found, wanted = np.shape(one)[alone:], shape[alone:]
+                raise ValueError(f"{name} has shape {found}; it must be {wanted}")
+            w[:, getattr(ocp, name)] = 0.0 if one is None else one * unit
+        n, d, m, stages = of.states, of.names.size, ocp.fixed_action.size, len(ocp.states)
+        found = np.zeros((count, n + d + m + of.data_names.size * stages))
+        rows = [k for k, one in enumerate(solutions) if one is not None]
+        if rows:
+            solved = [one for one in solutions if one is not None]
+            found[rows] = self._pulled(
+                solved, np.broadcast_to(value, count)[rows], w[rows], alone=alone
+            )
+        state, theta, action, data = np.split(found, np.cumsum([n, d, m]), axis=1)
+        data = data.reshape(count, stages, -1)
         parts = {name: of.data_names.part(name, data) for name in of.data_names}
         return Gradient(
             state / units.states,
             theta,
-            action / units.inputs[: action.size],
-            {name: part.reshape(-1, *of.data_names[name]) for name, part in parts.items()},
+            action / units.inputs[:m],
+            {name: part.reshape(count, -1, *of.data_names[name]) for name, part in parts.items()},
         )
+
+    def _pulled(
+        self, solutions: list[Solution], value: Vector, w: Matrix, *, alone: bool
+    ) -> Matrix:
+        """The derivatives in p, a row a solution; only the value's where a plan has none.
+
+        CasADi's functions take a column a solution.
+        """
+        inside = [self.units.inside(one) for one in solutions]
+        of_each = ((one.primal, one.parameters, one.constraint_duals) for one in inside)
+        given = [np.array(part).T for part in zip(*of_each, strict=True)]
+        found = value * self._backward.gradient(*given)
+        steps = {}
+        for k in np.flatnonzero(w.any(axis=1)).tolist():
+            step = self.compiled(Compiled.adjoint, solutions[k], w[k])
+            if step is not None:
+                steps[k] = step
+                continue
+            try:
+                found[:, k] += w[k] @ self.dense(Sensitivity.plan, solutions[k], of=self._backward)
+            except DerivativeError:
+                if alone:
+                    raise
+        if steps:
+            swept, moved = [*steps], np.array([*steps.values()]).T
+            z, p, lam = (part[:, swept] for part in given)
+            found[:, swept] += self._backward.along(z, p, lam, moved, w[swept].T)
+        return found.T
 
     @property
     def machine(self) -> Compiled | None:

@@ -104,6 +104,23 @@ def test_the_entries_of_the_plan_are_the_policys_derivatives():
     assert found.data["target"].shape == (7, 2)
 
 
+@pytest.mark.parametrize("solver", ["riccati", "fatrop"])
+def test_a_batch_has_the_gradient_of_each_and_zeros_where_a_solve_failed(solver):
+    nmpc, rng = Nmpc(pendulum(), solver=solver), np.random.default_rng(0)
+    states = np.vstack([rng.uniform(-0.9, 0.9, (4, 2)), [[np.nan, 0.0]]])
+    batch = nmpc.solve_many(states, nmpc.problem.theta, actions=rng.uniform(-1, 1, (5, 1)))
+    value, inputs = rng.normal(size=5), rng.normal(size=(5, 6, 1))
+    found = nmpc.gradient(batch, value, inputs)
+    for k in range(4):
+        one = nmpc.gradient(batch[k], value[k], inputs[k])
+        for part in ("state", "theta", "action"):
+            np.testing.assert_allclose(getattr(found, part)[k], getattr(one, part), atol=1e-12)
+        np.testing.assert_allclose(found.data["wind"][k], one.data["wind"], atol=1e-12)
+    assert not found.theta[4].any()
+    with pytest.raises(ValueError, match=r"inputs has shape \(6, 1\); it must be \(5, 6, 1\)"):
+        nmpc.gradient(batch, value, inputs[0])
+
+
 def test_weights_of_another_shape_are_refused():
     nmpc = Nmpc(pendulum(), solver="fatrop")
     here = nmpc.solve([0.3, -0.2], nmpc.problem.theta)
