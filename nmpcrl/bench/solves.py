@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError, baselines
+from nmpcrl.bench import baselines
+from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError
 from nmpcrl.control.solvers.riccati import machine_code
 from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper

@@ -11,27 +11,7 @@ from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati, real_time
 from nmpcrl.control.task import Obstacle, Task
 
 __all__ = [
-    "Batch",
-    "DerivativeError",
-    "Fatrop",
-    "Gradient",
-    "Hard",
-    "Ipopt",
-    "Nmpc",
-    "Obstacle",
-    "Parameter",
-    "Plant",
-    "Policy",
-    "Problem",
-    "Riccati",
-    "Series",
-    "Soft",
-    "Solution",
-    "SolverError",
-    "Status",
-    "Task",
-    "differential_drive",
-    "real_time",
-    "rk4",
-    "unicycle",
-]
+    "Batch", "DerivativeError", "Fatrop", "Gradient", "Hard", "Ipopt", "Nmpc", "Obstacle",
+    "Parameter", "Plant", "Policy", "Problem", "Riccati", "Series", "Soft", "Solution",
+    "SolverError", "Status", "Task", "differential_drive", "real_time", "rk4", "unicycle",
+]  # fmt: skip

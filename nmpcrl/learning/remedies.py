@@ -105,6 +105,16 @@ def of_each_step(learner: Learner, who: str) -> UpdateRule:
     return learner.rule
 
 
+class Around:
+    """What is put around a rule, of which its memory holds the `inner` one."""
+
+    rule: UpdateRule
+
+    def interrupted(self, theta: Vector, memory: Any) -> tuple[Vector, Any]:
+        theta, inner = self.rule.interrupted(theta, memory.inner)
+        return theta, memory._replace(inner=inner)
+
+
 class Mean(NamedTuple):
     """The memory of an `averaged` rule."""
 
@@ -114,7 +124,7 @@ class Mean(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Averaging:
+class Averaging(Around):
     """The functions of a rule that remembers mean <- mean + (theta - mean) / n after some steps."""
 
     rule: UpdateRule
@@ -129,17 +139,13 @@ class Averaging:
         part = 1 / max(steps - self.skip, 1)
         return theta, Mean(memory.theta + part * (theta - memory.theta), steps, inner)
 
-    def interrupted(self, theta: Vector, memory: Mean) -> tuple[Vector, Mean]:
-        theta, inner = self.rule.interrupted(theta, memory.inner)
-        return theta, memory._replace(inner=inner)
-
 
 def averaged(learner: Learner, skip: int = 0) -> Learner:
     """A learner that remembers the mean of its theta after `skip` steps, for `judged_theta`.
 
     Source: Polyak and Juditsky (1992).
     """
-    return _wrapped(learner, "averaged", Averaging(learner.bounded_rule, skip))
+    return wrapped(learner, "averaged", Averaging(learner.bounded_rule, skip))
 
 
 class Counted(NamedTuple):
@@ -150,7 +156,7 @@ class Counted(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Scheduling:
+class Scheduling(Around):
     """The functions of a rule that goes a part of its way."""
 
     rule: UpdateRule
@@ -163,17 +169,13 @@ class Scheduling:
         moved, inner = self.rule.step(theta, memory.inner, *given)
         return theta + self.part(memory.steps) * (moved - theta), Counted(memory.steps + 1, inner)
 
-    def interrupted(self, theta: Vector, memory: Counted) -> tuple[Vector, Counted]:
-        theta, inner = self.rule.interrupted(theta, memory.inner)
-        return theta, memory._replace(inner=inner)
-
 
 def scheduled(learner: Learner, part: Callable[[int], float]) -> Learner:
     """A learner whose step k moves theta by `part(k)` of its way: alpha becomes alpha part(k).
 
     scheduled(q_learning(nmpc, 1e-3), lambda k: 1 / (1 + k / 500)) is Robbins and Monro's (1951).
     """
-    return _wrapped(learner, "scheduled", Scheduling(learner.bounded_rule, part))
+    return wrapped(learner, "scheduled", Scheduling(learner.bounded_rule, part))
 
 
 class Best(NamedTuple):
@@ -186,7 +188,7 @@ class Best(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Undoing:
+class Undoing(Around):
     """The functions of a rule that goes back to the best theta where a rollout costs more.
 
     It begins with a rollout of the first theta, and makes one after every `every` episodes, those
@@ -209,8 +211,7 @@ class Undoing:
         return self._judged(theta, memory) if transition.last else (theta, memory)
 
     def interrupted(self, theta: Vector, memory: Best) -> tuple[Vector, Best]:
-        theta, inner = self.rule.interrupted(theta, memory.inner)
-        return self._judged(theta, memory._replace(inner=inner))
+        return self._judged(*super().interrupted(theta, memory))
 
     def _judged(self, theta: Vector, memory: Best) -> tuple[Vector, Best]:
         """After `every` episodes keep theta, or go back."""
@@ -226,10 +227,10 @@ class Undoing:
 
 def undo(learner: Learner, confirm: Callable[[Vector], float], every: int = 1) -> Learner:
     """A learner that takes back steps after which a rollout without noise costs more: `Undoing`."""
-    return _wrapped(learner, "undone", Undoing(learner.bounded_rule, confirm, every))
+    return wrapped(learner, "undone", Undoing(learner.bounded_rule, confirm, every))
 
 
-def _wrapped(learner: Learner, how: str, own: Averaging | Scheduling | Undoing) -> Learner:
+def wrapped(learner: Learner, how: str, own: Any) -> Learner:
     rule = UpdateRule(own.step, own.init, own.interrupted)
     return replace(learner, name=f"{learner.name} {how}", rule=rule)
 

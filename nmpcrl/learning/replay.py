@@ -9,7 +9,7 @@ from nmpcrl import Vector
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.learning.bootstrap import NextValue, SecondSolve, Transition
 from nmpcrl.learning.learners import Learner, UpdateRule, Weights
-from nmpcrl.learning.remedies import of_each_step
+from nmpcrl.learning.remedies import Around, of_each_step, wrapped
 from nmpcrl.learning.updates import td_error
 
 
@@ -22,9 +22,10 @@ class Buffer(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Replaying:
+class Replaying(Around):
     """The functions of a rule that follows each step by steps along earlier transitions."""
 
+    rule: UpdateRule
     learner: Learner
     nmpc: Nmpc
     draws: int
@@ -32,12 +33,12 @@ class Replaying:
     seed: int
 
     def init(self, weights: Weights) -> Buffer:
-        return Buffer((), 0, self.learner.rule.init(weights))
+        return Buffer((), 0, self.rule.init(weights))
 
     def step(
         self, theta: Vector, memory: Buffer, transition: Transition, *given: Any
     ) -> tuple[Vector, Buffer]:
-        step = self.learner.bounded_rule.step
+        step = self.rule.step
         theta, inner = step(theta, memory.inner, transition, *given)
         kept = (*memory.kept, transition)[-self.size :]
         rng = np.random.default_rng([self.seed, memory.steps])
@@ -48,10 +49,6 @@ class Replaying:
                 continue
             theta, inner = step(theta, inner, *found)
         return theta, Buffer(kept, memory.steps + 1, inner)
-
-    def interrupted(self, theta: Vector, memory: Buffer) -> tuple[Vector, Buffer]:
-        theta, inner = self.learner.rule.interrupted(theta, memory.inner)
-        return theta, memory._replace(inner=inner)
 
     def _anew(self, theta: Vector, old: Transition) -> tuple[Transition, float, NextValue]:
         """A transition with its present solution, its TD error and the value of its next state."""
@@ -78,6 +75,5 @@ def replayed(
     of_each_step(learner, "replay")
     if not isinstance(learner.bootstrap, SecondSolve):
         raise ValueError(f"replay needs a solve in the next state, which {learner.name} has not")
-    own = Replaying(learner, nmpc, draws, size, seed)
-    rule = UpdateRule(own.step, own.init, own.interrupted)
-    return replace(learner, name=f"{learner.name} replayed", rule=rule)
+    own = Replaying(learner.bounded_rule, learner, nmpc, draws, size, seed)
+    return wrapped(learner, "replayed", own)

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.bench import learners, scaling, solves
-from nmpcrl.control import Riccati, SolverError, baselines
+from nmpcrl.bench import baselines, learners, scaling, solves
+from nmpcrl.control import Riccati, SolverError
 from nmpcrl.study import paper
 
 THETA = solves.THETA

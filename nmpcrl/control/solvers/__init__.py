@@ -12,18 +12,9 @@ from nmpcrl.control.solvers.solver import (
 )
 
 __all__ = [
-    "LARGEST_TOLERANCE",
-    "LEAST_TOLERANCE",
-    "SOLVERS",
-    "TOLERANCE",
-    "Fatrop",
-    "Ipopt",
-    "Prepared",
-    "Riccati",
-    "Solver",
-    "real_time",
-    "solver_of",
-]
+    "LARGEST_TOLERANCE", "LEAST_TOLERANCE", "SOLVERS", "TOLERANCE", "Fatrop", "Ipopt",
+    "Prepared", "Riccati", "Solver", "real_time", "solver_of",
+]  # fmt: skip
 
 SOLVERS: dict[str, type[Solver]] = {kind.name: kind for kind in (Riccati, Fatrop, Ipopt)}
 

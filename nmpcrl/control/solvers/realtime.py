@@ -9,9 +9,7 @@ from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.riccati import NOTICE, TEXTS, Riccati
 from nmpcrl.control.vectors import positive_integer
 
-TEXT = '''"""`find.find`, whose warm solves end early."""
-
-import numpy as np
+TEXT = '''import numpy as np
 from numba import njit
 
 from . import find as whole

@@ -11,7 +11,7 @@ from nmpcrl.control import Fatrop, Nmpc, Plant, Riccati, SolverError, Task
 from nmpcrl.control.codegen import jit
 from nmpcrl.control.solvers.nlpsol import Program
 from nmpcrl.control.solvers.riccati import machine_code
-from nmpcrl.control.solvers.trace import interpreted
+from nmpcrl.report.trace import interpreted
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)

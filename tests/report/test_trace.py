@@ -6,7 +6,7 @@ from small_problems import pendulum
 
 from nmpcrl.control import Nmpc, Riccati
 from nmpcrl.control.solvers import TOLERANCE
-from nmpcrl.control.solvers.trace import interpreted, trace
+from nmpcrl.report.trace import interpreted, trace
 from nmpcrl.study import paper
 from nmpcrl.study.problems import gros_zanon
 
