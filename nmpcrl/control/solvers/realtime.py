@@ -9,7 +9,7 @@ from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.riccati import NOTICE, TEXTS, Riccati
 from nmpcrl.control.vectors import positive_integer
 
-TEXT = '''import numpy as np
+TEXT = """import numpy as np
 from numba import njit
 
 from . import find as whole
@@ -32,7 +32,7 @@ def find(
         data, lower, upper, sides, kind, discount, weights, tie, state, theta, action, fixed,
         others, drawn, start, tolerance, warm_start, out,
     )
-'''
+"""
 
 
 def real_time(steps: int = 1) -> Riccati:
