@@ -24,7 +24,8 @@ FILLS = {  # with the colour of the word; the darker, the more is left of the cl
     UNDECIDABLE: ("white", "0.45"),
 }
 SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
-LETTERS = -2.15  # where the letters of the departures stand, in widths of a cell
+SHORT = WORDS | {PARTLY: "part"}  # in a cell half an inch wide
+LETTERS = -2.4  # where the letters of the departures stand, in widths of a cell
 FOLD = 10  # characters of a line above a column
 SMALL: dict[str, Any] = {"va": "center", "fontsize": "small"}
 
@@ -49,7 +50,7 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
         axes.text(-0.1, y, named(row), ha="right", **SMALL)
         if height[row] == min(height[one] for one in rows if letters[one] == letters[row]):
             axes.text(LETTERS, y, letters[row], ha="left", **SMALL)
-    axes.text(LETTERS, -0.8, "departure", ha="left", **(SMALL | {"va": "bottom"}))
+    axes.text(LETTERS, -0.8, "letter", ha="left", **(SMALL | {"va": "bottom"}))
     for i, claim in enumerate(claims):
         head = f"{claim}\n{_folded(BY_RUNS[claim].short, FOLD)}"
         axes.text(i + 0.5, -0.8, head, ha="center", **(SMALL | {"va": "bottom"}))
@@ -89,9 +90,9 @@ def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
     fill, ink = FILLS[cell["outcome"]]
     place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
     axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.5", linewidth=0.5))
-    text = WORDS[cell["outcome"]]
+    text = SHORT[cell["outcome"]]
     if cell["changes"]:
-        text = f"{WORDS[cell['base']]} → {text}"
+        text = f"{SHORT[cell['base']]}→{text}"
         axes.add_patch(Rectangle(place, *size, fill=False, edgecolor="black", linewidth=1.8))
     elif 0 < cell["share"] < 1:
         text += f" {cell['share']:.0%}"
