@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.imitation import HELD_OUT, imitate
-from nmpcrl.study import Experiment, run
 from nmpcrl.study.records import Records
 
 
@@ -34,6 +33,8 @@ def test_both_networks_learn_a_value_that_does_not_depend_on_theta(moving):
     records = made_up(lambda state, _: 10 * state[:, 0], moving)
     imitation = imitate(records, fits=1000)
     assert imitation.error("without_theta") < 0.3 * imitation.value.std()
+    squares = (imitation.without_theta - imitation.value) ** 2
+    assert imitation.error("without_theta") == pytest.approx(np.sqrt(squares.mean()))
     assert imitation.error("with_theta") < 0.5 * imitation.value.std()
 
 
@@ -49,11 +50,6 @@ def test_every_fifth_episode_is_held_out_or_the_last_and_a_failed_solve_is_left_
     first, again = (imitate(records, fits=20) for _ in range(2))
     assert first.value.size == 50
     np.testing.assert_array_equal(first.with_theta, again.with_theta)
-
-
-def test_a_run_of_the_robot_can_be_imitated_and_the_error_is_a_root_mean_square():
-    records = run(Experiment("ES", episodes=5, steps=40, evaluate_every=5))
-    imitation = imitate(records, fits=50)
-    assert imitation.value.shape == (40,)
-    away = np.linalg.norm(imitation.with_theta - imitation.value)
-    assert imitation.error("with_theta") == pytest.approx(away / np.sqrt(40))
+    held_out = records.steps["episode"] == HELD_OUT - 1  # and no network has seen its values
+    records.steps["value"] = records.steps["value"] + 1e3 * held_out
+    np.testing.assert_array_equal(imitate(records, fits=20).with_theta, first.with_theta)

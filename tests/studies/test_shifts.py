@@ -90,6 +90,7 @@ def test_a_change_that_is_told_resets_theta_or_raises_the_rate_for_a_while(train
         ([0, 1, 1], [1.0] * 3, "never", [0, 0, 0], [], [1, 2, 3]),
         ([0] * 30 + [1] * 2, [*STEADY, 5000.0, 5000.0], "cost", [*[0] * 31, 1], [30], [31, 1]),
         ([0] * 32, [*STEADY, 5000.0, 9000.0], "cost", [0] * 32, [30], [31, 1]),  # a false alarm
+        ([*[0] * 30, 1, 0], [*STEADY, 5000.0, 5000.0], "cost", [*[0] * 31, 1], [30], [31, 1]),
         ([0, 0, 0], [1.0, None, 1.0], "told", [0, 0, 0], [], [1, 1, 2]),  # diverges, keeps theta
     ],
 )

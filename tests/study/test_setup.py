@@ -68,3 +68,9 @@ def test_the_noise_of_a_seed_is_the_same_for_all_learners_and_readings(name, val
     runs = [prepare(Experiment(**{name: one}, seed=3), CONTROLLER)[2] for one in values]
     for explore in runs:
         np.testing.assert_array_equal(explore.noise, runs[0].noise)
+
+
+@pytest.mark.parametrize(("decay", "k"), [("step", np.arange(6)), ("episode", [0, 0, 0, 1, 1, 1])])
+def test_noise_decays_per_step_or_per_episode_as_the_experiment_says(decay, k):
+    explore = prepare(Experiment(decay=decay, decay_rate=0.9, episodes=2, steps=3), CONTROLLER)[2]
+    np.testing.assert_allclose(explore.scale.ravel(), 0.9 ** np.array(k))
