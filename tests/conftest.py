@@ -1,5 +1,4 @@
-"""Where things are, a browser for the tests of the built site, and results with round numbers:
-a benchmark that nobody measured, and evidence that nobody trained."""
+"""Where things are, a browser for the tests of the built site, and a benchmark nobody measured."""
 
 import copy
 import os
@@ -8,20 +7,18 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
 import pytest
+from builders import evidence_of
 from hypothesis import settings
 
-from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.solves import transposed
 from nmpcrl.claims.published import Evidence
 from nmpcrl.control import differential_drive
-from nmpcrl.study import Experiment, design, jobs, paper
+from nmpcrl.study import jobs, paper
 
 settings.register_profile("fixed", deadline=None, derandomize=True)  # the machine may be busy
 settings.register_profile("random", deadline=None, derandomize=False, print_blob=True)
@@ -240,89 +237,7 @@ MEASURED = {
 }
 
 
-START_COST = 1000.0
-AROUND = np.array([[-2.5, 1.5], [-2.5, 8.0], [3.0, 8.0], [8.5, 8.0], [8.5, 2.0]])  # no obstacle
-TRAJECTORY = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
-
-
 @pytest.fixture(scope="session")
 def made_up() -> Callable[..., Evidence]:
-    """Makes evidence, as `evidence_of` says."""
+    """Makes evidence, as `builders.evidence_of` says."""
     return evidence_of
-
-
-def evidence_of(
-    unlike: Callable[[Experiment], dict[str, Any]] = lambda experiment: {},
-    *,
-    layouts: tuple[str, ...] = ("A", "D"),
-    seeds: tuple[int, ...] = (0, 1, 2, 3),
-    episodes: int = paper.EPISODES,
-    source: Callable[[Experiment], str] = lambda experiment: "fresh",
-) -> Evidence:
-    """A main table in which every learner saves a tenth at once; `unlike` says what is not so."""
-    wanted = design.main_table(layouts=layouts, seeds=seeds, episodes=episodes)
-    summaries = {one: summary_of(one, **unlike(one)) for one in wanted}
-    found = Evidence().joined(summaries, dict.fromkeys(wanted, design.MAIN_TABLE))
-    return replace(found, runs=found.runs.assign(source=[*map(source, wanted)]))
-
-
-STILL = np.empty(0)  # the inputs of a robot that is not moved
-
-
-def summary_of(
-    experiment: Experiment,
-    *,
-    end: float = 0.9,
-    swing: float = 0.0,
-    training: float = 1.0,
-    reached: int | None = None,
-    states: np.ndarray = TRAJECTORY,
-    actions: np.ndarray = STILL,
-    inside: tuple[int, int, int] = (0, 0, 0),
-    imitation: tuple[float, float] = (0.5, 1.0),
-    **columns: Any,
-) -> RunSummary:
-    """A run in which little happens.
-
-    Args:
-        experiment: names it.
-        end: its noise-free cost after the start, over the start's.
-        swing: how much of the start's cost every other late rollout costs more.
-        training: cost of its training episodes, over the start's.
-        reached: after how many episodes it was stopped.
-        states: of its last rollout without noise.
-        actions: likewise; zeros by default.
-        inside: states in an obstacle by size, in its first episode.
-        imitation: held-out errors with and without theta.
-        columns: further columns of `RunSummary.episodes`, or the value of all their rows.
-    """
-    count, every = experiment.episodes, experiment.evaluate_every
-    due = np.unique([*range(0, count + 1, every), count])
-    end = 1.0 if experiment.learner == "frozen" else end
-    cost = START_COST * np.where(due == 0, 1.0, end)
-    cost[(due >= count / 2) & (due // every % 2 == 0)] += swing * START_COST
-    quiet = dict.fromkeys(("failed", "restarts", "outside", "inputs", "over"), 0)
-    quiet |= {"steps": 130, "overlap": -0.1, "alpha_phi2": 0.4, "delta": 30.0, "loss": 1.0}
-    quiet |= {"bias": 0.0, "error": 10.0, "iterations": 5.0, "seconds": 0.01}
-    episodes = {name: np.full(count, value) for name, value in (quiet | columns).items()}
-    episodes["cost"] = np.full(count, START_COST * training)
-    episodes["theta"] = np.tile(experiment.theta, (count, 1))
-    episodes["w"] = np.full((count, len(experiment.theta)), paper.W_INIT)
-    episodes["inside"] = np.zeros((count, 3), int)
-    episodes["inside"][0] = inside
-    if reached is not None:
-        due, cost = due[due <= reached], cost[due <= reached]
-        episodes["cost"][reached:], episodes["theta"][reached:] = np.nan, np.nan
-    evaluations = {
-        "episode": due,
-        "theta": np.tile(experiment.theta, (due.size, 1)),
-        "cost": cost,
-        "inside": np.zeros((due.size, 3), int),
-        "overlap": np.full(due.size, -0.1),
-        "distance": np.zeros(due.size),
-    }
-    errors = dict(zip(("with_theta", "without_theta"), imitation, strict=True))
-    facts: dict[str, Any] = {"seconds": 1.0, "imitation": errors}
-    facts["stopped"] = "finished" if reached is None else "diverged: theta"
-    inputs = np.zeros((len(states), 2)) if actions is STILL else actions
-    return RunSummary(asdict(experiment), episodes, evaluations, states, inputs, facts)

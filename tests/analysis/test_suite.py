@@ -119,10 +119,6 @@ def test_the_name_of_an_entry_has_its_settings_and_gives_it_back(base, settings,
     assert (entry(name).name, str(entry(name))) == (base, name)
 
 
-MODULES = {"number": "number = 3", "raises": "raise RuntimeError('not today')",
-           "fails": "def factory(robot): raise KeyError('x')"}  # fmt: skip
-
-
 @pytest.mark.usefixtures("trains_here")
 @pytest.mark.parametrize(
     ("name", "options", "message"),
@@ -134,21 +130,19 @@ MODULES = {"number": "number = 3", "raises": "raise RuntimeError('not today')",
         ("undone-ES[every=1.5]", {}, "every = 1.5 must be a whole number above 0"),
         ("nonsense", {}, "entry = 'nonsense' must be MODULE:FACTORY or one of frozen, grid"),
         ("no_such_module:factory", {}, "cannot be imported: ModuleNotFoundError: No module named"),
-        ("number:other", {}, "cannot be imported: AttributeError: module 'number' has no attr"),
-        ("number:number", {}, "must be the name of a function of a Robot, not of 3"),
-        ("raises:factory", {}, "cannot be imported: RuntimeError: not today"),
-        ("fails:factory", {"layouts": 1}, "'fails:factory' failed in J001: KeyError: 'x'"),
-        ("ES", {"budget": 0}, "budget = 0"),
-        ("ES", {"layouts": 121}, "layouts = 121"),
-        ("ES", {"seeds": 0}, "seeds = 0"),
+        ("mine_for_suite:other", {}, "cannot be imported: AttributeError"),
+        ("mine_for_suite:number", {}, "must be the name of a function of a Robot, not of 3"),
+        ("mine_for_suite:fails", {"layouts": 1}, "fails' failed in J001: KeyError: 'x'"),
+        *(("ES", {name: value}, f"{name} = {value}")
+          for name, value in (("budget", 0), ("layouts", 121), ("seeds", 0))),
     ],
-)
+)  # fmt: skip
 def test_an_unknown_entry_a_failing_one_and_a_number_out_of_range_are_refused(
     tmp_path, monkeypatch, name, options, message
 ):
-    for module, text in MODULES.items():
-        (tmp_path / f"{module}.py").write_text(text)
-        monkeypatch.delitem(sys.modules, module, raising=False)
+    text = "number = 3\ndef fails(robot): raise KeyError('x')"
+    (tmp_path / "mine_for_suite.py").write_text(text)
+    monkeypatch.delitem(sys.modules, "mine_for_suite", raising=False)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(Refusal, match=message):
         judge_all(name, **options)
@@ -191,16 +185,19 @@ def test_one_episode_too_many_is_seen_even_if_it_is_hidden_or_late(factory, over
     assert (found.over, found.episodes) == (over, 3)
 
 
-@pytest.mark.parametrize("answer", [None, 3, np.zeros(8), np.full(9, np.nan), "theta"])
-def test_what_is_neither_theta_nor_a_policy_is_refused(answer):
-    with pytest.raises(ParameterError, match=r"what the entry returned = .* must be 9 finite num"):
-        judge(lambda robot: answer, "J001", 1, 3)
+THETAS = (None, 3, np.zeros(8), np.full(9, np.nan), "theta")
+ACTIONS = ([0.1], [np.nan, 0.0], "north")
 
 
-@pytest.mark.parametrize("action", [[0.1], [0.1, 0.2, 0.3], [np.nan, 0.0], "north"])
-def test_an_action_that_is_none_is_refused(action):
-    with pytest.raises(ParameterError, match=r"what the policy chose = .* must be 2 finite num"):
-        judge(lambda robot: lambda observation: action, "J001", 0, 2)
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [*((one, "what the entry returned = .* must be 9 finite") for one in THETAS),
+     *((lambda seen, one=one: one, "what the policy chose = .* must be 2 finite")
+       for one in ACTIONS)],
+)  # fmt: skip
+def test_what_is_neither_theta_nor_a_policy_nor_an_action_is_refused(answer, said):
+    with pytest.raises(ParameterError, match=said):
+        judge(lambda robot: answer, "J001", 1, 2)
 
 
 @pytest.mark.usefixtures("trains_here")
@@ -228,24 +225,6 @@ def test_an_entry_ends_where_the_published_one_did(base):
     found = judge(entry(known.arm), known.place, suite.seed_of(known.place, known.k), 50)
     assert found.cost == pytest.approx(known.cost, rel=1e-4)
     assert (found.episodes, found.arrived) == (known.episodes, known.arrived)
-
-
-@pytest.mark.parametrize(("name", "policy"), [("frozen", "init"), ("CMA-ES", "CMA-ES")])
-@pytest.mark.parametrize("place", ["M03", "M04"])
-def test_a_search_among_moving_obstacles_ends_where_the_published_one_did(name, policy, place):
-    _need_current("worlds", "moving")
-    table = published.read("worlds")
-    chosen = (table.part == "moving") & (table.arm == f"extrapolated {policy}")
-    known = table[chosen & (table.place == place) & (table.k == 0)].iloc[0]
-    found = judge(entry(name), place, suite.seed_of(place, 0), 50)
-    assert found.cost == pytest.approx(known.cost, rel=1e-4)
-    assert (found.inside, found.arrived) == (known.inside, known.arrived)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["ES", "DES", "RDES", "TDRC", "undone-LSTD-Q", "DPG"])
-def test_learners_are_judged_among_moving_obstacles_too(name):
-    assert 0 < judge(entry(name), "M03", 0, 3).cost < np.inf
 
 
 def test_seeds_are_held_out_and_no_two_places_share_one():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.bench import sweep
 from nmpcrl.bench.sweep import SweepTable, Tally

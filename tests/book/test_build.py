@@ -12,12 +12,12 @@ import nbformat
 import pytest
 import yaml
 from bs4 import BeautifulSoup
+from builders import raising
 from click.testing import CliRunner
 from driver import project
 from driver.build import book, chapters, execute, train
 from filelock import FileLock
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
-from raising import raising
 
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 from nmpcrl.control.codegen.source import CannotCompile

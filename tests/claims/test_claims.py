@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from builders import START_COST, quiet_row, timings
 from hypothesis import given
 from hypothesis import strategies as st
-from quiet_rows import START_COST, quiet_row, timings
 
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.metrics import TOUCH

@@ -51,18 +51,6 @@ def test_a_build_trains_the_published_runs_of_the_design_again(monkeypatch):
         evidence.repeatable("no")
 
 
-@pytest.mark.parametrize(
-    ("wrong", "named"),
-    [
-        ({"source": "stale"}, "study = 'stale' must be one of published, fresh"),
-        ({"layouts": ["Z"]}, "layout = 'Z'"),
-    ],
-)
-def test_a_value_that_is_not_allowed_is_refused_in_a_sentence(wrong, named):
-    with pytest.raises(ParameterError, match=named):
-        needed(**{"source": "fresh", **ASKED, **wrong})
-
-
 def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_are_stored(known):
     found, there = gather("published", **ASKED), table(known)
     assert found.is_published

@@ -4,7 +4,7 @@ import ast
 import re
 from datetime import UTC, datetime
 
-from fixed_questions import git
+from history import git
 
 from nmpcrl.claims import prespecified, published
 from nmpcrl.claims.prespecified import NUMBERS, decided_since, fixed

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from quiet_rows import timings
+from builders import timings
 
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.search import Search, SearchResult
@@ -187,19 +187,12 @@ def scaled(one, factor):
     return replace(one, evaluations=one.evaluations | {"cost": factor * one.evaluations["cost"]})
 
 
-@pytest.mark.parametrize("name", ["runs.csv", "runs.npz", "searches.csv", "timings.csv"])
-def test_a_file_that_is_missing_or_changed_is_refused_before_a_number_is_shown(known, folder, name):
-    (folder / name).write_bytes((folder / name).read_bytes()[:-1])
-    forget()
-    with pytest.raises(Damaged, match=f"{name} is not the file that was published"):
-        load()
-    (folder / name).unlink()
-    with pytest.raises(Damaged, match=f"{name} cannot be read"):
-        load()
-    shutil.rmtree(folder)
-    forget()
-    with pytest.raises(Damaged, match=r"nothing is published .*`git checkout -- book/published`"):
-        load()
+def test_what_is_missing_is_refused_before_a_number_is_shown(known, folder):
+    for path, said in ((folder / "runs.npz", "npz cannot be read"), (folder, "git checkout")):
+        path.unlink() if path.is_file() else shutil.rmtree(path)
+        forget()
+        with pytest.raises(Damaged, match=said):
+            load()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pandas as pd
 import pytest
-from quiet_rows import timings
+from builders import timings
 
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import reproduce

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from quiet_rows import quiet_row
+from builders import quiet_row
 
 from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.claims.paper_claims import BY_RUNS

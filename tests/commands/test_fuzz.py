@@ -5,7 +5,7 @@ import random
 import click
 import pandas as pd
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.bench import problem_times, suite, sweep

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 
-from nmpcrl.analysis import summaries
 from nmpcrl.claims.published import Damaged
 from nmpcrl.commands.refusals import INSTEAD, sentence
 from nmpcrl.study import Experiment, StoreError, fetch, limits
@@ -99,14 +98,6 @@ def test_a_file_in_the_place_of_the_folder_of_runs(command, tmp_path, line):
     (tmp_path / "runs").write_text("")
     said = refused(command(*line.split()))
     assert f"NMPCRL_RUNS = {str(tmp_path / 'runs')!r} must be a folder" in said
-
-
-def test_a_place_that_cannot_be_published_to(command, monkeypatch, tmp_path):
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "file/published"))
-    monkeypatch.setattr(summaries, "fetch_summaries", raising(AssertionError("work has begun")))
-    said = refused(command("study", "--publish"))
-    assert f"{tmp_path / 'file/published'}: Not a directory" in said
 
 
 @pytest.mark.parametrize(

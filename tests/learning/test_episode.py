@@ -5,9 +5,9 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
+from builders import raising
 from learning.small_runs import THETA
 from numba import njit
-from raising import raising
 
 from nmpcrl.control import Riccati, SolverError, differential_drive
 from nmpcrl.control.solvers import riccati

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser

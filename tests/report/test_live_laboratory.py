@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.control.codegen.source import CannotCompile

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.analysis import two_state
 from nmpcrl.control.codegen.source import CannotCompile

@@ -7,7 +7,7 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.claims import published
 from nmpcrl.control.codegen.source import CannotCompile

@@ -8,7 +8,7 @@ other numbers there, too. A part is asked once its published rows are of the pre
 import numpy as np
 import pandas as pd
 import pytest
-from registered import INVESTIGATIONS
+from history import INVESTIGATIONS
 
 from nmpcrl.claims.investigation import Condition, rounded
 from nmpcrl.study.learners import LEARNERS

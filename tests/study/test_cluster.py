@@ -8,11 +8,11 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from made_records import assert_same_numbers
+from builders import assert_same_numbers
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.study import StoreError, cluster, run, sweep
+from nmpcrl.study import cluster, run, sweep
 from nmpcrl.study.refusal import Refusal
 
 distributed = pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
@@ -35,16 +35,11 @@ def noting(experiment):
 
 store.run = noting
 """
-OTHER_VERSIONS = """
-from nmpcrl.study import provenance
-
-provenance.installed = lambda library: "0.1"
-"""
 pytestmark = pytest.mark.usefixtures("runs")
 
 
 @pytest.fixture
-def dask(tmp_path) -> Iterator[Callable[[int, str], str]]:
+def dask(tmp_path) -> Iterator[Callable[..., str]]:
     """Start a scheduler, and workers that first execute a text; its address is returned."""
     started = []
 
@@ -88,17 +83,6 @@ def test_a_killed_worker_loses_no_run_and_no_bit(dask, tmp_path):
         assert_same_numbers(found[experiment], summarise(run(experiment)))
         assert SUMMARIES.is_stored(experiment)
     assert not [*(tmp_path / "elsewhere").rglob("*.npz")]
-
-
-@pytest.mark.slow
-def test_a_run_of_a_worker_with_other_versions_is_not_stored(dask):
-    said = "the worker made another run, or one of other versions"
-    with (
-        cluster.executor(dask(1, OTHER_VERSIONS), 240.0) as executor,
-        pytest.raises(StoreError, match=said),
-    ):
-        fetch_summaries(SIX[:1], executor=executor, progress=False)
-    assert not SUMMARIES.is_stored(SIX[0])
 
 
 def refused(address: str, patience: float, sentence: str) -> None:

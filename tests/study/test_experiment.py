@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_records import assert_same_numbers
+from builders import assert_same_numbers
 
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.control.codegen import jit
@@ -15,6 +15,7 @@ from nmpcrl.learning.episode import Loop
 from nmpcrl.study import Experiment, ParameterError, paper, run
 from nmpcrl.study.design import FIELDS
 from nmpcrl.study.learners import LEARNERS
+from nmpcrl.study.parameters import shown
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Records, StepStatus
 
@@ -24,17 +25,17 @@ SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are re
 
 
 REFUSED = [  # fields, and values just beyond what is allowed
-    (("learner", "decay", "network", "box", "solver"), ("other", None)),
-    (("gated", "clipped", "constrained", "ties_active", "curvature", "projected"), (0, "yes")),
-    (("alpha", "beta", "zeta", "beta_tdc"), (-1e-7, 0.0, 1.1e6)),
+    (("learner", "decay", "network", "box", "solver"), ("other", None, ["ES"])),
+    (("gated", "clipped", "constrained", "ties_active", "curvature", "projected"), (1, "true")),
+    (("alpha", "beta", "zeta", "beta_tdc"), (-1e-7, 0.0, 1.1e6, np.nan, True, "0.5")),
     (("decay_rate",), (0.0, 1.01)),
-    (("seed",), (-1, 1.5, 2**31)),
+    (("seed",), (-1, 1.5, 2**31, True, "3")),
     (("episodes", "evaluate_every"), (0, 20.0, 100_001)),
     (("steps",), (0, 10_001)),
     (("horizon",), (0, 501)),
     (("tolerance",), (0.1, 1e-13)),
-    (("layout",), (None, "Z", ((0, 0, 0),), "0,1 2")),
-    (("theta",), ((1.0,) * 8, (1.0,) * 8 + (1.1e6,), "1")),
+    (("layout",), (None, "Z", ((0, 0, 0),), "0,1 2", (), ((1, 2),) * 17, ((0, 101),))),
+    (("theta",), ((1.0,) * 8, (1.0,) * 8 + (1.1e6,), "1", ("1",) * 9)),
     (("start", "target"), ((9.1, 0, 0), (0, -3.5, 0), (0, 0, 6.3))),
 ]
 
@@ -48,7 +49,7 @@ def message_of(**fields):
 @pytest.mark.parametrize(("names", "values"), REFUSED)
 def test_a_field_refuses_other_values_in_one_sentence(names, values):
     for name, value in product(names, values):
-        assert message_of(**{name: value}) == f"{name} = {value!r} must be {FIELDS[name].text}"
+        assert message_of(**{name: value}) == f"{name} = {shown(value)} must be {FIELDS[name].text}"
 
 
 def test_equal_values_name_the_same_run_and_the_defaults_are_table_is():
@@ -145,14 +146,6 @@ def test_gated_learners_stand_still_for_127_steps(runs, learner):
     assert (s["theta"][127] != paper.THETA_INIT).any()
     for name in ("delta", "loss"):
         assert np.flatnonzero(np.isfinite(s[name])).tolist() == [*range(127, 140)]
-
-
-def test_read_literally_they_move_from_the_first_step():
-    """Towards a network that knows nothing yet: theta_x falls, as departure G says."""
-    s = run(Experiment(learner="RDES", gated=False, episodes=1, steps=60)).steps
-    assert np.isnan(s["loss"]).all()
-    assert (s["delta"] < 0).mean() > 0.9
-    assert s["theta"][-1, 0] < 0.7
 
 
 def test_evaluations_come_first_every_so_often_and_last_and_each_episode_is_reported():

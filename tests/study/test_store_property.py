@@ -18,10 +18,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from builders import assert_same_numbers, made_records
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from made_records import assert_same_numbers, made_records
 
 from nmpcrl.study import (
     DamagedRecords,

@@ -6,31 +6,12 @@ from functools import partial
 import casadi as ca
 import numpy as np
 import pytest
-from made_records import assert_same_numbers
-from raising import raising
+from builders import assert_same_numbers, raising
 
 from nmpcrl.control import Ipopt, Nmpc, Problem
-from nmpcrl.learning import (
-    Exploration,
-    Weights,
-    expected_sarsa,
-    frozen,
-    lstd_q,
-    random_direction,
-    train,
-)
-from nmpcrl.study import (
-    Experiment,
-    ParameterError,
-    Trial,
-    fetch,
-    fetch_all,
-    paper,
-    run,
-    store,
-)
+from nmpcrl.learning import Exploration, Weights, expected_sarsa, frozen, lstd_q, train
+from nmpcrl.study import Experiment, ParameterError, Trial, fetch, fetch_all, paper, run, store
 from nmpcrl.study.provenance import key
-from nmpcrl.study.store import RUNS
 
 pytestmark = pytest.mark.usefixtures("runs")
 
@@ -38,17 +19,11 @@ pytestmark = pytest.mark.usefixtures("runs")
 def tank(horizon=3) -> Nmpc:
     """One state, two parameters, no task."""
     problem = Problem(
-        states=1,
-        inputs=1,
-        horizon=horizon,
-        gamma=0.9,
-        theta={"gain": 0.5, "V0": 0.0},
+        states=1, inputs=1, horizon=horizon, gamma=0.9, theta={"gain": 0.5, "V0": 0.0},
         model=lambda x, u, th: 0.9 * x + th["gain"] * u,
         stage=lambda x, u, th: ca.sumsqr(x - 1) + 0.1 * ca.sumsqr(u),
-        initial=lambda x, th: th["V0"],
-        lower=-1,
-        upper=1,
-    )
+        initial=lambda x, th: th["V0"], lower=-1, upper=1,
+    )  # fmt: skip
     return Nmpc(problem, solver=Ipopt())
 
 
@@ -91,17 +66,6 @@ def test_a_trial_is_what_train_does():
     np.testing.assert_array_equal(records.steps["theta"], [s.weights.theta for s in steps])
 
 
-def test_a_trial_is_stored_and_read(runs, monkeypatch):
-    records = fetch(trial())
-    (path,) = (runs / "trials").iterdir()
-    assert path == RUNS.path_of(trial())
-    assert path.name.startswith("LSTD_Q-seed0-2ep-")
-    assert records.steps["theta"].shape[1:] == (2,)
-    assert records.evaluations["states"].shape == (3, 6, 1)
-    monkeypatch.setattr(store, "run", raising(AssertionError("trained again")))
-    assert_same_numbers(fetch(trial()), records)
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -120,8 +84,14 @@ def test_every_field_of_a_trial_is_part_of_its_key(change):
     assert trial(**change) != trial() == pickle.loads(pickle.dumps(trial()))
 
 
-def test_three_seeds_of_a_random_start_are_three_runs(trains_here):
+def test_three_seeds_of_a_random_start_are_three_runs_which_are_stored(
+    runs, trains_here, monkeypatch
+):
     found = fetch_all([trial(seed=seed) for seed in range(3)], workers=1, progress=False)
+    names = sorted(path.name.rpartition("-")[0] for path in (runs / "trials").iterdir())
+    assert names == [f"LSTD_Q-seed{seed}-2ep" for seed in range(3)]
+    monkeypatch.setattr(store, "run", raising(AssertionError("trained again")))
+    assert_same_numbers(fetch(trial()), found[trial()])
     assert len({records.facts["final_cost"] for records in found.values()}) == 3
     assert [one.seed for one in found.select(seed=1)] == [1]
 
@@ -144,11 +114,6 @@ def test_trials_of_a_notebook_are_done_in_other_processes(runs):
     assert len([*(runs / "trials").iterdir()]) == 2
     for one in trials:
         assert_same_numbers(found[one], run(one))
-
-
-def test_a_learner_that_draws_is_given_a_generator_of_the_seed():
-    one = trial(make=partial(random_direction, alpha=1e-3))
-    assert_same_numbers(run(one), run(one))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from raising import raising
+from builders import raising
 from wasm_host import Controller, Module
 
 from nmpcrl.control import Nmpc, Obstacle, Plant, Task, differential_drive

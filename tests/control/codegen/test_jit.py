@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from raising import raising
+from builders import raising
 
 from nmpcrl.control.codegen import folder, jit
 from nmpcrl.control.codegen.source import CannotCompile

@@ -1,6 +1,7 @@
-"""Modules as Git has them at the commit that registered an investigation."""
+"""What Git says of an investigation, and modules as they were when it was registered."""
 
 import io
+import os
 import subprocess
 import sys
 import tarfile
@@ -10,7 +11,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from types import ModuleType
 
-from fixed_questions import ROOT, git
+import pytest
 
 from nmpcrl.studies.agents import SAC_AND_TD3
 from nmpcrl.studies.difficulty import DIFFICULTY
@@ -20,9 +21,26 @@ from nmpcrl.studies.population import POPULATION
 from nmpcrl.studies.remedies import REMEDIES
 from nmpcrl.studies.worlds import WORLDS
 
+ROOT = Path(__file__).resolve().parents[1]
 INVESTIGATIONS = (
     SAC_AND_TD3, DIFFICULTY, INTERVENTIONS, OTHER_PROBLEMS, POPULATION, REMEDIES, WORLDS,
 )  # fmt: skip
+
+
+def no_history(reason: str) -> None:
+    """Skip a test of the history; where that must be tested, fail."""
+    if os.environ.get("NMPCRL_REQUIRE_HISTORY") or os.environ.get("CI"):
+        pytest.fail(f"no history: {reason}, and NMPCRL_REQUIRE_HISTORY or CI is set")
+    pytest.skip(f"no history: {reason}")
+
+
+def git(*arguments: str) -> str:
+    asked = ["git", "-C", str(ROOT), *arguments]
+    shallow = ["git", "-C", str(ROOT), "rev-parse", "--is-shallow-repository"]
+    done, whole = (subprocess.run(one, capture_output=True, text=True) for one in (asked, shallow))
+    if done.returncode or whole.stdout.strip() != "false":
+        no_history(done.stderr or "this is a shallow clone")
+    return done.stdout.strip()
 
 
 @cache
