@@ -42,7 +42,7 @@ lab: .venv-lab/ready  ## Open the chapters in JupyterLab, which has an environme
 study: .venv/ready  ## Train the whole study, or what is missing of it: hours, and it can be interrupted
 	@$(BIN)/python -m nmpcrl study
 
-bench: .venv/ready  ## Measure how long solves, steps and runs take, and print what is reached
+bench: .venv/ready  ## Measure how long learning steps and solves take
 	@$(BIN)/python -m nmpcrl bench
 
 # On all cores, up to four. A target that names files does so to read no others: tests/conftest.py

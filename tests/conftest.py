@@ -1,6 +1,5 @@
-"""Where things are, a browser for the tests of the built site, and a benchmark nobody measured."""
+"""Where things are, a browser for the tests of the built site, and times that nobody measured."""
 
-import copy
 import os
 import re
 import shutil
@@ -11,11 +10,12 @@ from pathlib import Path
 
 import numba
 import numpy as np
+import pandas as pd
 import pytest
 from builders import evidence_of
 from hypothesis import settings
 
-from nmpcrl.bench.solves import transposed
+from nmpcrl.bench.learners import PAPER_HOURS
 from nmpcrl.claims.published import Evidence
 from nmpcrl.control import differential_drive
 from nmpcrl.study import jobs, paper
@@ -166,75 +166,26 @@ def robot_module() -> bytes:
     return browser.module(differential_drive(), paper.task("A"))
 
 
-LOOPS = ("without noise", "with noise")
-SOLVERS = {"riccati": 40e-6, "fatrop": 0.8e-3, "ipopt": 2e-3, "ipopt MX": 4e-3, "rebuilt": 40e-3}
+SOLVERS = {"riccati": 0.04, "fatrop": 0.8, "ipopt": 2.0}  # [ms] of a solve
 SOLVES = {"ES": 2.0, "GES": 2.0, "RDES": 1.0, "DES": 1.0}
-FIT = 0.2  # [ms]
-REST = 0.02  # [ms]
-HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}
-
-
-def learner(solver: str, name: str) -> tuple:
-    solve, fit = 1e3 * SOLVERS[solver], FIT if name in ("RDES", "DES") else None
-    step = SOLVES[name] * solve + (fit or 0.0) + REST
-    hours, ratio = step * 39 / 3600, step / (SOLVES["ES"] * solve + REST)
-    parts = (SOLVES[name], step, solve, fit, REST, hours, HOURS.get(name))
-    return solver, name, *parts, ratio, ratio - 0.01, ratio + 0.01, 0.0
-
-
-def growing(varied: str, sizes: tuple[int, ...], each: float) -> list[tuple]:
-    return [(varied, size, 4 * (4e-6 + each * size), 4) for size in sizes for _ in range(3)]
+FIT, REST = 0.2, 0.02  # [ms]
 
 
 @pytest.fixture
-def measured() -> dict[str, dict]:
-    """Every figure is reached, and everything is exactly linear; a test may change its copy."""
-    return copy.deepcopy(MEASURED)
-
-
-MEASURED = {
-    "about": {"length": "full", "key": "0", "date": "2026-01-01", "seconds": 60.0, "others": 0.1},
-    "solves": transposed(
-        "loop solver warm seconds iterations suboptimality",
-        [
-            (loop, solver, t > 0, seconds if t else 10 * seconds, 5, 0.0)
-            for loop in LOOPS
-            for solver, seconds in SOLVERS.items()
-            for t in range(5)
-        ],
-    ),
-    "loop": transposed("loop seconds", [(loop, 40e-6) for loop in LOOPS for _ in range(5)]),
-    "parts": {"part": ["solve, compiled part", "step of the plant"], "seconds": [30e-6, 2e-6]},
-    "scaling": transposed(
-        "varied size seconds iterations",
-        growing("horizon", (5, 10, 20, 40, 80), 0.5e-6)
-        + growing("obstacles", (1, 4, 8, 16, 32), 0.25e-6),
-    ),
-    "learners": transposed(
-        "solver learner solves ms_per_step ms_per_solve ms_per_fit ms_per_rest hours hours_paper"
-        " ratio ratio_low ratio_high waited",
-        [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
-    ),
-    "mpcrl": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
-    "runs": {
-        "learner": list(SOLVES),
-        "episodes": [300] * 4,
-        "seconds": [4.0, 4.0, 16.0, 16.0],
-        "processor": [4.0, 4.0, 16.0, 16.0],
-    },
-    "episodes": transposed(
-        "learner episode seconds memory",
-        [(name, k, 0.01 * k, 400_000_000) for name in SOLVES for k in range(1, 301)],
-    ),
-    "parallel": {"workers": [1, 2], "seconds": [20.0, 10.5], "runs": [4, 4], "episodes": [9, 9]},
-    "first": {
-        "cached": [False, True, True],
-        "solve": [30.0, 0.6, 0.8],
-        "step": [1.0, 0.1, 0.1],
-        "process": [33.0, 2.0, 2.0],
-        "notice": [True, False, False],
-    },
-}
+def timings() -> pd.DataFrame:
+    """Times of learning steps, as of `time_learners`, in which only solves differ."""
+    rows = []
+    for solver, solve in SOLVERS.items():
+        for name, count in SOLVES.items():
+            fit = FIT if name in ("RDES", "DES") else np.nan
+            step, one = count * solve + np.nan_to_num(fit) + REST, 2 * solve + REST
+            parts = {"solves": count, "ms_per_step": step, "ms_per_solve": solve, "ms_per_fit": fit}
+            hours = {"hours": step * 39 / 3600, "hours_paper": PAPER_HOURS.get(name, np.nan)}
+            ratio = {"ratio": step / one, "ratio_low": step / one - 0.01}
+            ratio |= {"ratio_high": step / one + 0.01, "waited": 0.0}
+            named = {"solver": solver, "learner": name}
+            rows.append(named | parts | {"ms_per_rest": REST} | hours | ratio)
+    return pd.DataFrame(rows)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,10 @@
-"""How long a learning step takes: our learners with each solver, and mpcrl's beside ours."""
+"""How long a learning step takes: the learners take turns with each solver, in one process.
 
+`python -m nmpcrl.bench.learners STEPS` prints the table of `time_learners` as JSON.
+"""
+
+import json
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import astuple
@@ -10,53 +15,22 @@ import pandas as pd
 
 from nmpcrl import Matrix
 from nmpcrl.bench.paired import TURN, Ratio, paired_ratio
-from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning.training import Step, train
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import prepare
 
-SETTLED = max(paper.BATCH, paper.STEPS)  # steps before counting: the networks are fitted then
+LEARNERS = ("ES", "GES", "RDES", "DES")
 REFERENCE = "ES"  # whose step the others' are compared with
+SETTLED = max(paper.BATCH, paper.STEPS)  # steps before counting: the networks are fitted then
+PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time of 300 episodes
+PAPER_SOLVE = PAPER_HOURS["ES"] * 3600 / (2 * paper.EPISODES * paper.STEPS)  # [s]
 COMPARED = ["ratio", "ratio_low", "ratio_high", "waited"]  # columns: the fields of `Ratio`
 
 
-def against_mpcrl(rounds: int, steps: int) -> Columns:
-    """ES and mpcrl's Q-learning in turn, an episode's first steps each; seconds of every step.
-
-    Returns:
-        A row a round and learner: learner ("ES" or "mpcrl"), seconds. No rows without mpcrl.
-    """
-    rows: list[tuple[str, float]] = []
-    try:
-        from nmpcrl.bench.baseline_mpcrl import time_mpcrl
-    except ImportError:
-        rounds = 0
-    for _ in range(rounds):
-        rows += [("mpcrl", seconds) for seconds in time_mpcrl(steps)]
-        rows += [("ES", seconds) for seconds in _time_es(steps)]
-    return transposed("learner seconds", rows)
-
-
-def _time_es(steps: int) -> list[float]:
-    """Seconds of as many first steps of five episodes of ES, each with noise of its own."""
-    times = []
-    for seed in range(5):
-        learning = learn("ES", seed=seed)
-        next(learning)  # the first call loads the solver
-        for _ in range(steps):
-            began = time.perf_counter()
-            next(learning)
-            times.append(time.perf_counter() - began)
-    return times
-
-
-PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time of 300 episodes
-
-
 def time_learners(
-    learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
+    learners: tuple[str, ...] = LEARNERS,
     solvers: tuple[str, ...] = tuple(SOLVERS),
     steps: int = 3 * paper.STEPS,
 ) -> pd.DataFrame:
@@ -84,9 +58,7 @@ def time_learners(
         ratio_high and waited (nan where ES is not among the learners).
     """
     runs = {
-        (solver, learner): learn(learner, solver=solver)
-        for solver in solvers
-        for learner in learners
+        (solver, learner): _steps(learner, solver) for solver in solvers for learner in learners
     }
     times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
     names, rng = list(runs), np.random.default_rng(0)
@@ -96,13 +68,53 @@ def time_learners(
                 times[names[i]].append(_timed(runs[names[i]]))
     counted = {name: np.array(rows[SETTLED:]).T for name, rows in times.items()}
     rows = [
-        _means(parts)
+        dict[str, Any](solver=solver, learner=learner)
+        | _means(parts)
         | {"hours_paper": PAPER_HOURS.get(learner, np.nan)}
         | _against(parts, counted.get((solver, REFERENCE)))
         for (solver, learner), parts in counted.items()
     ]
-    named = pd.DataFrame(list(counted), columns=["solver", "learner"])
-    return named.join(pd.DataFrame(rows))
+    return pd.DataFrame(rows)
+
+
+def ratio(timings: pd.DataFrame, solver: str, learner: str) -> Ratio:
+    """Time of a learner's step over that of one of ES with the same solver.
+
+    Args:
+        timings: of `time_learners`.
+        solver: name of both's.
+        learner: name.
+
+    Raises:
+        KeyError: the learner was not timed with this solver.
+    """
+    row = timings.set_index(["solver", "learner"]).loc[(solver, learner)]
+    return Ratio(*(float(row[name]) for name in COMPARED))
+
+
+def _steps(learner: str, solver: str) -> Iterator[Step]:
+    """The steps of one run as they are made."""
+    experiment = Experiment(learner=learner, solver=solver)
+    controller = paper.nmpc(solver=solver)
+    learning, weights, explore = prepare(experiment, controller)
+    return train(learning, controller, weights, explore)
+
+
+def _timed(steps: Iterator[Step]) -> tuple[float, ...]:
+    """The next step: its number of solves; the time [s] of these, of the network and of all.
+
+    The last number is the processor's time of all, of every thread. No solve fails here.
+    """
+    began, worked = time.perf_counter(), time.process_time()
+    step = next(steps)
+    work, passed = time.process_time() - worked, time.perf_counter() - began
+    if step.solution is None or step.update is None:
+        raise RuntimeError(f"a solve failed while timing: {step.failure}")
+    successor = step.update.successor
+    second = successor.solution if successor else None
+    solving = step.solution.seconds + (second.seconds if second else 0.0)
+    fitting = successor.seconds if successor else 0.0
+    return (2.0 if second else 1.0), solving, fitting, passed, work
 
 
 def _means(parts: Matrix) -> dict[str, float]:
@@ -130,36 +142,5 @@ def _against(mine: Matrix, reference: Matrix | None) -> dict[str, float]:
     )
 
 
-def ratio(timings: pd.DataFrame, solver: str, learner: str) -> Ratio:
-    """Time of a learner's step over that of one of ES with the same solver.
-
-    Raises:
-        KeyError: the learner was not timed with this solver.
-    """
-    row = timings.set_index(["solver", "learner"]).loc[(solver, learner)]
-    return Ratio(*(float(row[name]) for name in COMPARED))
-
-
-def learn(learner: str, **fields: Any) -> Iterator[Step]:
-    """The steps of one run as they are made; `fields` are those of `Experiment`."""
-    experiment = Experiment(learner=learner, **fields)
-    controller = paper.nmpc(solver=experiment.solver)
-    learning, weights, explore = prepare(experiment, controller)
-    return train(learning, controller, weights, explore)
-
-
-def _timed(steps: Iterator[Step]) -> tuple[float, ...]:
-    """The next step: its number of solves; the time [s] of these, of the network and of all.
-
-    The last number is the processor's time of all, of every thread. No solve fails here.
-    """
-    began, worked = time.perf_counter(), time.process_time()
-    step = next(steps)
-    work, passed = time.process_time() - worked, time.perf_counter() - began
-    if step.solution is None or step.update is None:
-        raise RuntimeError(f"a solve failed while timing: {step.failure}")
-    successor = step.update.successor
-    second = successor.solution if successor else None
-    solving = step.solution.seconds + (second.seconds if second else 0.0)
-    fitting = successor.seconds if successor else 0.0
-    return (2.0 if second else 1.0), solving, fitting, passed, work
+if __name__ == "__main__":
+    print(json.dumps(time_learners(steps=int(sys.argv[1])).to_dict("list")))

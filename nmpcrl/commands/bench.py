@@ -1,62 +1,42 @@
-"""`nmpcrl bench`: how long solves, steps and runs take."""
+"""`nmpcrl bench`: how long learning steps and solves take."""
 
 import click
-
-PROBLEMS = 100_000  # of a sweep
 
 
 @click.command()
 @click.option("--full", "length", flag_value="full", default=True, help="Measure for minutes.")
 @click.option("--short", "length", flag_value="short", help="Measure what the book needs.")
 @click.option("--smoke", "length", flag_value="smoke", help="Only check that it works.")
-@click.option("--again", is_flag=True, help="Measure even if a benchmark is stored.")
+@click.option("--again", is_flag=True, help="Measure even if a table is stored.")
 @click.option("--publish", is_flag=True, help="Only time the learners, and publish C3 and C4.")
-@click.option(
-    "--sweep",
-    metavar="[N]",
-    is_flag=False,
-    flag_value=PROBLEMS,
-    type=int,
-    help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count the outcomes.",
-)
-@click.option("--sizes", is_flag=True, help="Only time problems of many sizes, and beside mpcrl.")
-def bench(length: str, again: bool, publish: bool, sweep: int | None, sizes: bool) -> None:
-    """Measure how long solves, steps and runs take.
+def bench(length: str, again: bool, publish: bool) -> None:
+    """Measure how long learning steps and solves take.
 
-    The times are compared with targets, and stored with the runs.
+    The table of learning steps is stored with the runs, and read from there.
 
     \b
     Example:
       nmpcrl bench --short
-      nmpcrl bench --sweep 1000
     """
-    if sweep is not None:
-        from nmpcrl.bench import sweep as sweeps
-
-        click.echo(f"{sweeps.sweep(sweep)}\n{sweeps.path()}: stored")
-    elif sizes:
-        from nmpcrl.bench import problem_times
-
-        found = problem_times.make()
-        for table in (found.sizes, found.peers):
-            click.echo(table.round(1).to_string(index=False))
-        click.echo(f"{problem_times.path()}: stored")
-    elif publish:
+    if publish:
         _publish_timing()
     else:
         _print_times(length, again=again)
 
 
 def _print_times(length: str, *, again: bool) -> None:
-    from nmpcrl.bench import suite, targets
+    from nmpcrl.bench import measurement, solves
+    from nmpcrl.study import paper
 
-    measured = suite.measure(length) if again else suite.read_or_measure(length)
-    about = measured["about"]
-    click.echo(targets.shown(targets.targets(measured)))
+    found = measurement.measure(length) if again else measurement.read_or_measure(length)
+    click.echo("Learning steps [ms]; ratios are to a step of ES with the same solver:\n")
+    click.echo(found.timings.drop(columns=["hours", "hours_paper"]).round(3).to_string(index=False))
     click.echo(
-        f"{suite.path()}: {about['length']}, {about['date']}, {about['seconds']:.0f} s;"
-        f" other programs used up to {about['others']:.0%} of the cores"
+        f"\n{measurement.path()}: {found.length}, {found.date}, {found.seconds:.0f} s;"
+        f" other programs used {found.others:.0%} of the cores"
     )
+    click.echo("\nWarm solves of the same problems [us], with the gradient of the value:\n")
+    click.echo(solves.compare(solves.solvers(), paper.nmpc()).round(2).to_string())
 
 
 def _publish_timing() -> None:

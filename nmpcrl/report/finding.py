@@ -88,11 +88,11 @@ def use(found: Finding | None) -> str:
         But {above_TDC} of its runs end above the cost that they began with, {worse_TDC} by more
         than {better:.0%}; of ES {worse_ES} do, of GES {worse_GES}
         ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A network pays only where a solve is slow
-        ([Chapter 9](performance.ipynb)).
+        ([the solver and its speed](solver.ipynb)).
 
         **What it costs.** {episodes} episodes, in which the robot moves for
         {hours_of_the_robot:.1f} hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core
-        ([Chapter 8](solver.ipynb)).
+        ([the solver](solver.ipynb)).
         """,
         origin=ORIGIN,
         episodes=str(paper.EPISODES),

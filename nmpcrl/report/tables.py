@@ -10,7 +10,6 @@ from types import MappingProxyType
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
-from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import THEOREMS
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_THAN, kept_without_noise
 from nmpcrl.claims.published import Published
@@ -41,11 +40,6 @@ BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
 }
 PUBLISHED = "published"  # whose numbers a table shows, if nothing else is said
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
-MET = {
-    True: ("reached", BADGES[REPRODUCED]),
-    False: ("missed", BADGES[NOT]),
-    None: ("not measured", BADGES[UNDECIDABLE]),
-}
 HELD = {True: ("holds", BADGES[REPRODUCED]), False: ("does not hold", BADGES[NOT])}
 
 
@@ -146,15 +140,6 @@ def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
         for a in assumptions
     )
     return html_table(caption, ("Assumption", *THEOREMS, "Here"), rows)
-
-
-def target_table(targets: Iterable[Target], caption: str) -> str:
-    """One row a target, in HTML: what was measured, and whether that is enough."""
-    rows = (
-        (_text(t.what), _text(t.to_reach), f"{_badge(*MET[t.reached])}<br>{_text(t.measured)}")
-        for t in targets
-    )
-    return html_table(caption, ("What", "To reach", "Here"), rows)
 
 
 TIMES = {  # columns of `time_learners` with one number each, and what one of their units is

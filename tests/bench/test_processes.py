@@ -1,58 +1,27 @@
 """What is measured in processes of its own; how long it takes, no test says."""
 
-import os
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.bench import fresh_process, processes
+from nmpcrl.bench import processes
 from nmpcrl.claims import published
-
-
-@pytest.mark.slow
-def test_a_whole_run_reports_every_episode():
-    totals, progress = processes.whole_runs(("frozen",), episodes=3)
-    assert totals["learner"] == ["frozen"]
-    assert totals["episodes"] == [3]
-    assert progress["episode"] == [1, 2, 3]
-    assert sorted(progress["seconds"]) == progress["seconds"]
-    assert progress["seconds"][-1] <= totals["seconds"][0]
-    assert min(progress["memory"]) > 10_000_000
-
-
-@pytest.mark.slow
-def test_runs_at_once_leave_neither_files_nor_environment(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    before = dict(os.environ)
-    measured = processes.at_once(runs=2, episodes=1)
-    assert measured["workers"] == sorted({1, os.cpu_count()})
-    assert min(measured["seconds"]) > 0
-    assert not list(tmp_path.iterdir())
-    assert dict(os.environ) == before
 
 
 def test_learners_that_are_timed_afresh_are_pooled_over_the_processes(monkeypatch):
     found = iter([0.5, 0.6, 0.72])
 
-    def alone(what, steps):
-        assert (what, steps) == ("steps", "130")
+    def alone(steps):
+        assert steps == 130
         ratio, speed = next(found), 3.0
-        each = {"ms_per_solve": 0.1, "ms_per_rest": np.nan, "ratio_low": None, "ratio_high": None}
-        rows = [
-            {"learner": "ES", "solves": 2.0, "ms_per_step": speed, "ms_per_fit": None, "ratio": 1},
-            {
-                "learner": "RDES",
-                "solves": 1.0,
-                "ms_per_step": ratio * speed,
-                "ms_per_fit": 0.2,
-                "ratio": ratio,
-            },
-        ]
-        rows = [{"solver": "ipopt"} | row | each | {"waited": 0.1} for row in rows]
-        return {name: [row[name] for row in rows] for name in rows[0]}, ""
+        each = dict.fromkeys(("ms_per_rest", "ratio_low", "ratio_high", "ms_per_fit"), np.nan)
+        each |= {"solver": "ipopt", "ms_per_solve": 0.1, "waited": 0.1}
+        es = {"learner": "ES", "solves": 2.0, "ms_per_step": speed, "ratio": 1.0}
+        rdes = {"learner": "RDES", "solves": 1.0, "ms_per_step": ratio * speed, "ms_per_fit": 0.2}
+        rows = [each | es, each | rdes | {"ratio": ratio}]
+        return pd.DataFrame(rows)
 
-    monkeypatch.setattr(processes, "_alone", alone)
+    monkeypatch.setattr(processes, "_time_learners", alone)
     es, rdes = processes.time_learners_afresh(3).to_dict("records")
     assert rdes["ratio"] == pytest.approx(0.6)
     assert rdes["ratio_low"] < 0.5
@@ -94,20 +63,13 @@ def test_at_least_nine_of_ten_published_repetitions_hold_what_they_come_to():
     assert timings.inside.min() >= 9
 
 
-def test_no_runs_at_once_are_no_rows():
-    assert not any(processes.at_once(runs=0, episodes=1).values())
-
-
 @pytest.mark.slow
-def test_a_first_call_with_machine_code_kept_says_nothing():
-    fresh_process.first_call()  # keeps it
-    measured = processes.first_calls(1, compile_too=False)
-    assert measured["cached"] == [True]
-    assert measured["notice"] == [False]
-    assert measured["process"][0] > measured["solve"][0] > 0
+def test_a_process_of_its_own_hands_back_the_table():
+    table = processes._time_learners(2)
+    assert len(table) == 3 * 4
+    assert list(table.ms_per_fit.isna()) == [True, True, False, False] * 3
 
 
-@pytest.mark.slow
-def test_a_measurement_that_fails_says_which_and_why():
-    with pytest.raises(RuntimeError, match=r"measuring run SARSA 1 failed(.|\n)*SARSA"):
-        processes._alone("run", "SARSA", "1")
+def test_a_measurement_that_fails_says_why():
+    with pytest.raises(RuntimeError, match=r"timing few steps(.|\n)*invalid literal"):
+        processes._time_learners("few")

@@ -1,10 +1,9 @@
-"""What the benchmark solves and counts; how fast, no test says."""
+"""What is solved and counted; how fast, no test says."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from nmpcrl.bench import baselines, learners, scaling, solves
+from nmpcrl.bench import baselines, solves
 from nmpcrl.control import Riccati, SolverError
 from nmpcrl.study import paper
 
@@ -51,61 +50,44 @@ def test_the_baselines_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
         write(nmpc)(nmpc.task.start, THETA, None)
 
 
-@pytest.fixture(scope="module")
-def interleaved():
-    return pd.DataFrame(solves.interleaved(episodes=1, steps=STEPS))
+def test_all_solvers_find_the_same_optima_near_the_start(nmpc):
+    table = solves.compare(solves.solvers(), nmpc, steps=STEPS)
+    names = ("riccati", "fatrop", "ipopt", "ipopt MX", "rebuilt")
+    assert [*table.index] == [(loop, name) for loop in solves.LOOPS for name in names]
+    assert (table[["worse", "failed"]] == 0).all(axis=None)
+    assert (table.iterations >= 1).all()
+    assert (table["median"] <= table.p95).all()
+    assert (table.p95 <= table["max"]).all()
+    assert (table.times.loc[:, "riccati"] == 1).all()
 
 
-def test_every_solver_solves_every_problem(interleaved):
-    assert len(interleaved) == len(solves.LOOPS) * 5 * STEPS
-    counts = interleaved.groupby(["loop", "solver"]).size()
-    assert (counts == STEPS).all()
-    assert interleaved.seconds.min() > 0
-    assert interleaved.iterations.min() >= 1
+class Dear:
+    """A plan that costs half as much again."""
+
+    def __init__(self, solution):
+        self.value, self.iterations = 1.5 * solution.value, 1
 
 
-def test_the_first_solve_of_an_episode_is_not_warm(interleaved):
-    assert list(interleaved[interleaved.solver == "fatrop"].warm) == 2 * [False, True, True, True]
-
-
-def test_every_problem_has_a_best_solver_and_all_agree_near_the_start(interleaved):
-    suboptimality = interleaved.suboptimality.to_numpy().reshape(-1, 5)
-    assert (suboptimality.min(axis=1) == 0).all()
-    assert suboptimality.max() < 1e-6
-
-
-def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
+def test_a_dearer_plan_is_worse_and_none_a_failure_after_which_a_solver_starts_anew(nmpc):
     warm_starts = []
 
-    def fails_once(state, theta, warm_start):
+    def fails(state, theta, warm_start):
         warm_starts.append(warm_start)
-        if len(warm_starts) == 2:
-            raise SolverError("no", state, theta)
-        return nmpc.solve(state, theta, warm_start)
+        if len(warm_starts) % 2:
+            return nmpc.solve(state, theta)
+        raise SolverError("no", state, theta)
 
-    states = [state for state, _, _ in solves.closed_loop(nmpc, 0.0, np.random.default_rng(0), 3)]
-    named = {"sound": nmpc.solve, "fails": fails_once}
-    rows = list(solves._episode(states, named, np.random.default_rng(0)))
-    failed = [row[3:] for row in rows if row[0] == "fails"]
-    assert failed[1] == (None, None)
-    assert failed[2][1] == pytest.approx(0, abs=1e-6)
-    assert warm_starts[0] is None
+    named = {
+        "sound": nmpc.solve,
+        "dear": lambda state, theta, _: Dear(nmpc.solve(state, theta)),
+        "fails": fails,
+    }
+    table = solves.compare(named, nmpc, steps=STEPS).loc["without noise"]
+    assert dict(table.worse) == {"sound": 0.0, "dear": 1.0, "fails": 0.0}
+    assert table.failed["sound"] == table.failed["dear"] == 0.0
+    assert table.failed["fails"] == pytest.approx(1 / 3)  # of those after the first
     assert warm_starts[2] is None
-
-
-def test_the_suboptimality_is_relative_to_the_best_value(nmpc):
-    class Dear:
-        def __init__(self, solution):
-            self.value, self.iterations = 1.5 * solution.value, 1
-
-    named = {"sound": nmpc.solve, "dear": lambda s, theta, _: Dear(nmpc.solve(s, theta))}
-    rows = solves._episode([nmpc.task.start], named, np.random.default_rng(0))
-    assert {row[0]: row[4] for row in rows} == pytest.approx({"sound": 0.0, "dear": 0.5})
-
-
-def test_the_own_loop_has_both_loops_and_no_cold_solve():
-    loop = pd.DataFrame(solves.own_loop(episodes=2, steps=STEPS))
-    assert dict(loop.groupby("loop").size()) == dict.fromkeys(solves.LOOPS, 2 * (STEPS - 1))
+    assert warm_starts[3] is not None
 
 
 def test_without_noise_the_loop_is_the_policy_s_own(nmpc):
@@ -116,46 +98,7 @@ def test_without_noise_the_loop_is_the_policy_s_own(nmpc):
     assert np.abs(noisy - state).max() > 1e-3
 
 
-def test_a_solve_is_its_compiled_part_and_python(nmpc):
+def test_a_solve_is_longer_than_its_machine_code():
     parts = solves.parts(episodes=1)
-    assert len(parts["part"]) == 7
-    assert min(parts["seconds"]) > 0
-
-
-def test_added_obstacles_do_not_change_the_plan():
-    few, many = scaling._crowded(1), scaling._crowded(max(scaling.OBSTACLES))
-    assert len(many.task.obstacles) == max(scaling.OBSTACLES)
-    rng = np.random.default_rng(0)
-    for state, solution, _ in solves.closed_loop(few, 0.0, rng, 40):
-        assert many.solve(state, THETA).value == pytest.approx(solution.value, rel=1e-6)
-
-
-def test_every_size_has_as_many_warm_solves():
-    table = pd.DataFrame(scaling.solve_times(episodes=1, steps=3))
-    counts = table.groupby(["varied", "size"]).size()
-    assert list(counts.index) == [
-        *(("horizon", size) for size in scaling.HORIZONS),
-        *(("obstacles", size) for size in scaling.OBSTACLES),
-    ]
-    assert (counts == 2).all()
-
-
-@pytest.mark.slow
-def test_learners_are_timed_with_every_solver_and_what_is_missing_is_none():
-    columns = solves.columns_of(learners.time_learners(steps=2))
-    assert len(columns["solver"]) == 3 * 4
-    fits = dict(zip(columns["learner"], columns["ms_per_fit"], strict=True))
-    assert fits["ES"] is None
-    assert fits["RDES"] > 0
-
-
-def test_mpcrl_and_es_take_turns():
-    pytest.importorskip("mpcrl")
-    columns = learners.against_mpcrl(rounds=2, steps=2)
-    assert columns["learner"] == 2 * (2 * ["mpcrl"] + 10 * ["ES"])
-    assert min(columns["seconds"]) > 0
-
-
-def test_without_mpcrl_there_is_nothing_to_compare_with(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "nmpcrl.bench.baseline_mpcrl", None)
-    assert learners.against_mpcrl(rounds=1, steps=1) == {"learner": [], "seconds": []}
+    assert parts["solve"] > parts["of it compiled"] > 0
+    assert parts["solve again"] > 0

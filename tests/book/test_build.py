@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import nbformat
 import pytest
@@ -295,22 +296,13 @@ def test_cells_and_solutions_that_fail_are_named_and_no_older_book_survives(smal
     assert not (small / "_build/html").exists()
 
 
-def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
-    needs = chapters.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
+def test_the_learners_are_timed_before_the_chapters_run_and_in_the_way():
+    needs = chapters.ask(ROOT / "book/solver.ipynb", {"length": "smoke"})
     assert not needs.experiments
     assert not needs.summaries
     (call,) = needs.beforehand
-    assert call.func.__name__ == "read_or_measure"
-    assert call.args == ("smoke",)
-
-
-def test_the_page_that_judges_times_asks_only_for_theirs_beforehand():
-    chapter = ROOT / "book/for_reviewers.ipynb"
-    given = {name: book.SMOKE[name] for name in chapters.parameters(chapter) if name in book.SMOKE}
-    needs = chapters.ask(chapter, given)
-    (call,) = needs.beforehand
     assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
-    assert call.keywords == {"only": ["learning steps"], "calm": True}
+    assert call.keywords == {"calm": True}
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -336,18 +328,15 @@ CONTRADICTION = (
 
 
 def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
-    """Of times, right after they were measured; what measures no times says nothing."""
-    from nmpcrl.bench import summary
+    """Of times, right after they were measured."""
     from nmpcrl.claims import published, reproduce
 
     monkeypatch.setattr(published, "load", published.Published)
-    monkeypatch.setattr(summary, "learners", lambda measured: measured["learners"])
     monkeypatch.setattr(reproduce, "of_times", lambda timings, known: (timings,))
-    train.measure((lambda: None, lambda: {"solves": {}}))
     with pytest.raises(
         project.Failure, match=r"ones:\nC3 is reproduced \[0.50, 0.60\] here, and not"
     ):
-        train.measure((lambda: {"learners": CONTRADICTION},))
+        train.measure((lambda: SimpleNamespace(timings=CONTRADICTION),))
 
 
 def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_runs(monkeypatch):

@@ -39,7 +39,6 @@ GIVEN = [
     *OWN,
     "for_reviewers",
     "paper_and_book",
-    "performance",
     "other_problems",
     "what_to_try_first",
     "why_learning_stops",
@@ -48,7 +47,7 @@ GIVEN = [
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
-MORE = ["performance", "other_problems", "what_to_try_first", "why_learning_stops"]
+MORE = ["other_problems", "what_to_try_first", "why_learning_stops"]
 MORE += ["changing_world"]
 each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, *MORE])
 each_own = pytest.mark.parametrize("name", OWN)

@@ -8,7 +8,7 @@ import pytest
 from builders import raising
 
 from nmpcrl.analysis import summaries
-from nmpcrl.bench import problem_times, suite, sweep
+from nmpcrl.bench import measurement
 from nmpcrl.claims import publish, published, reproduce
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, fetch, jobs
@@ -25,8 +25,7 @@ BAD = (
 LONG = (  # replaced by a refusal
     *((summaries, "fetch_summaries"), (cluster, "executor"), (jobs, "processes")),
     *((publish, "publish_timing"), (reproduce, "relock")),
-    *((problem_times, "make"), (suite, "measure")),
-    *((suite, "read_or_measure"), (sweep, "sweep")),
+    *((measurement, "measure"), (measurement, "read_or_measure")),
 )
 
 

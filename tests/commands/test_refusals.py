@@ -52,7 +52,6 @@ REFUSALS = [  # what is typed, and what the refusal names
     ("wasm --problem nmpcrl.control:differential_drive", "is no Problem"),
     ("wasm --problem a:b --task c:d", "a Problem has no Plant and no Task beside it"),
     ("wasm --out /nowhere/at/all.wasm", "cannot be written"),
-    ("bench --sweep x", "'x' is not a valid int"),
     ("grade nowhere --out a.csv", "'nowhere' does not exist"),
     ("grade . --out a.csv --workers 0", "0 is not in the range x>=1"),
 ]
@@ -100,9 +99,7 @@ def test_a_file_in_the_place_of_the_folder_of_runs(command, tmp_path, line):
     assert f"NMPCRL_RUNS = {str(tmp_path / 'runs')!r} must be a folder" in said
 
 
-@pytest.mark.parametrize(
-    "line", ["bench --again --short", "bench --sweep 20", "wasm", "train --box soft --episodes 1"]
-)
+@pytest.mark.parametrize("line", ["bench --again --short", "wasm", "train --box soft --episodes 1"])
 def test_what_needs_machine_code_says_so_at_once_without_numba(
     command, monkeypatch, tmp_path, line
 ):

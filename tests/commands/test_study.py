@@ -10,7 +10,6 @@ import pytest
 from builders import raising
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
-from nmpcrl.bench import sweep as sweeping
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
@@ -26,9 +25,9 @@ CELL = ["variant", "learner", "layout", "decay", "seed"]
 
 
 @pytest.fixture
-def small(monkeypatch, measured, trains_here):
+def small(monkeypatch, timings, trains_here):
     """A study of six short runs, trained in this process, without searches and measured times."""
-    times = pd.DataFrame(measured["learners"])
+    times = timings
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
     monkeypatch.setattr(publish, "search_all", lambda _: SEARCHED)
     monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
@@ -124,12 +123,3 @@ def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
     said = done(command, "bench", "--publish", code=code)
     assert "0.65 [0.62, 0.68] with ipopt" in said
     assert ("nothing is published" in said) == bool(code)
-
-
-def test_bench_sweeps_over_as_many_problems_as_asked_for(command, monkeypatch):
-    asked = []
-    monkeypatch.setattr(sweeping, "sweep", lambda problems: asked.append(problems) or "a table")
-    for words in ((), ("20",)):
-        said = done(command, "bench", "--sweep", *words)
-        assert said == f"a table\n{sweeping.path()}: stored\n"
-    assert asked == [100_000, 20]

@@ -13,7 +13,7 @@ from scipy.stats import fisher_exact
 
 from nmpcrl.analysis.two_state import FIRST, PHI, PHI_NEXT, Chain, mspbe
 from nmpcrl.course import Unsolved
-from nmpcrl.course.checks import performance, solver, what_to_try_first
+from nmpcrl.course.checks import solver, what_to_try_first
 from nmpcrl.course.exercises import exercises
 from nmpcrl.study import paper
 
@@ -98,12 +98,6 @@ PROPERTIES = {  # of answers that need not be one function: wrong ones, and what
         lambda gradient, jacobian, g, multipliers: np.abs(
             gradient + jacobian.T @ multipliers
         ).max(): "It is 0 where",
-    },
-    performance.speed_up: {
-        lambda old, new: (old / new).mean(): "Exchanged, it must give",
-        lambda old, new: (new / old).mean(): "the answer is 3",
-        lambda old, new: old[0] / new[0]: "order of the problems",
-        lambda old, new: old.max() / new.max(): "One problem decides alone",
     },
     what_to_try_first.undone: {
         lambda theta, moves, cost: theta + sum(moves): "taken back",

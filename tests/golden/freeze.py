@@ -20,7 +20,6 @@ from plain_values import array, plain, plain_name, processor, short, table
 
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
-from nmpcrl.bench import problem_times, sweep
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import (
     evidence,
@@ -584,7 +583,7 @@ def spread_of_solvers() -> Any:
 
 @entry("problems")
 def sweep_of_drawn_problems() -> Any:
-    return sweep.read(published.folder() / "sweep.json").tally
+    return json.loads((published.folder() / "sweep.json").read_text())["tally"]
 
 
 # What is published, as it is loaded.
@@ -600,7 +599,8 @@ def _columns(rows: pd.DataFrame, names: str) -> pd.DataFrame:
 
 @entry("tables")
 def tables() -> Any:
-    times = problem_times.read(published.folder() / problem_times.FILE)
+    kept = json.loads((published.folder() / "problem_times.json").read_text())
+    times = {name: pd.DataFrame(kept[name]) for name in ("sizes", "peers")}
     known = {
         "runs": study().runs.drop(columns="source"),
         "runs of the main table": study().main.runs.drop(columns=["source", "cost_ratio"]),
@@ -617,8 +617,8 @@ def tables() -> Any:
         "spread of solvers": _columns(
             problems().spreads, "seed peers made before nudged after gap"
         ),
-        "times by size": times.sizes,
-        "times beside mpcrl": times.peers,
+        "times by size": times["sizes"],
+        "times beside mpcrl": times["peers"],
         "searches": pd.DataFrame([vars(one) | vars(two) for one, two in study().searches.items()]),
     }  # fmt: skip
     return {name: table(frame) for name, frame in known.items()}

@@ -23,6 +23,7 @@ MOVED = {  # addresses of pages that are no more
     "book/cluster": "reproduce.html#reproduce-cluster",
     "book/letter": "departures.html#departures-questions",
     "book/learn_alone": "teach.html#teach-alone",
+    "book/performance": "solver.html",
 }
 ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">

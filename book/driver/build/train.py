@@ -68,14 +68,11 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
 
 
 def measure(calls: tuple[Callable[[], Any], ...]) -> None:
-    """What is to be done with the machine to itself; times have their verdicts, too."""
-    from nmpcrl.bench import summary
+    """Time the learners with the machine to itself; times have their verdicts, too."""
     from nmpcrl.claims import published, reproduce
 
     for call in calls:
-        measured = call()
-        if isinstance(measured, dict) and "learners" in measured:
-            refuse_verdicts(reproduce.of_times(summary.learners(measured), published.load()))
+        refuse_verdicts(reproduce.of_times(call().timings, published.load()))
 
 
 def refuse_verdicts(contradictions: "Pairs") -> None:

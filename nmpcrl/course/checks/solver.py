@@ -1,4 +1,4 @@
-"""The exercises of the appendix on the solver."""
+"""The exercises of the appendix on the solver and its speed."""
 
 from itertools import cycle
 from typing import Any
@@ -7,7 +7,6 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.course import Outcome, behaves, choice, function, number
-from nmpcrl.course.checks.precision import to_digits
 
 
 def price(answer: Any) -> Outcome:
@@ -20,22 +19,7 @@ def price(answer: Any) -> Outcome:
         mistakes={
             weight: "That is the price of a violated constraint; here h is 0.",
             0.0: "That is the price of a constraint that is far from active; here h is 0.",
-            0.5: "That is mu. Both products of Eq. (8.2) are mu: which multipliers do they have?",
-        },
-    )
-
-
-def golden(answer: Any) -> Outcome:
-    """The fixed point of V = 1 + V - V^2 / (1 + V)."""
-    limit = (1 + 5**0.5) / 2
-    return number(
-        answer,
-        limit,
-        tolerance=to_digits(limit, 3),
-        mistakes={
-            1.5: "That is after one step from V = 1: go on, or set V equal on both sides.",
-            1.6: "That is after two steps from V = 1: go on, or set V equal on both sides.",
-            (1 - 5**0.5) / 2: "That solves the equation, too, but a cost is not negative.",
+            0.5: "That is mu. Both products of Eq. (2) are mu: which multipliers do they have?",
         },
     )
 
@@ -146,3 +130,19 @@ def _missing() -> list[tuple[str, int, Vector]]:
     off = [*units, *-units, *(units - np.roll(units, 1, 0))]  # the last ones add up to 0
     balanced = [(why, row, np.zeros(3)) for row in range(4) for why in broken]
     return balanced + [("gradient", k % 4, one) for k, one in enumerate(off)]
+
+
+def faster(answer: Any) -> Outcome:
+    """The ratio with solves half as long, from the ratio before."""
+    before = 0.7
+    fit = 2 * before - 1  # in solves
+    return number(
+        answer,
+        (0.5 + fit) / (2 * 0.5),
+        tolerance=0.01,
+        mistakes={
+            before: "Both solve, but only a part of a step of RDES gets shorter.",
+            before / 2: "A step of RDES does not get twice as fast: the fit stays.",
+            0.5 + fit / 4: "ES gets faster, and so does RDES: which of the two by more?",
+        },
+    )

@@ -238,7 +238,7 @@ def residual(solution: Solution, steepest: float, g: np.ndarray, slope: np.ndarr
     ("plant", "layouts", "failures"), [(ROBOT, 16, 4), (MASS, 6, 3)], ids=["robot", "mass"]
 )
 def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(plant, layouts, failures):
-    """About one in a thousand is given up, and says so; `nmpcrl bench --sweep` tries 100,000."""
+    """About one in a thousand is given up, and says so."""
     failed = restarted = 0
     for layout in range(layouts):
         rng = np.random.default_rng([1, layout])

@@ -1,1 +1,0 @@
-"""How fast: the solver, learning steps and whole runs."""

@@ -1,0 +1,125 @@
+"""When the timing table is read and when it is measured, and what the command prints."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from nmpcrl.bench import measurement, solves
+from nmpcrl.commands import main
+from nmpcrl.study import ParameterError, StoreError
+from nmpcrl.study.files import folder
+
+
+@pytest.fixture
+def waited():
+    """The share of the time that learning steps wait for a processor, when they are measured."""
+    return [0.0]
+
+
+@pytest.fixture
+def counted(tmp_path, monkeypatch, waited, timings):
+    """The lengths that were measured, in a folder of their own; measuring takes no time."""
+    lengths = []
+
+    def time_learners(processes, steps):
+        known = {one: name for name, one in measurement.LENGTHS.items()}
+        lengths.append(known[processes, steps])
+        return timings.assign(waited=waited[0])
+
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    monkeypatch.setattr(measurement, "time_learners_afresh", time_learners)
+    monkeypatch.setattr(measurement.psutil, "cpu_percent", lambda _: 25.0)  # watches for a second
+    return lengths
+
+
+def test_what_was_measured_is_read_again(counted, timings):
+    first, again = (measurement.read_or_measure("short") for _ in range(2))
+    assert counted == ["short"]
+    for one in (first, again):
+        pd.testing.assert_frame_equal(one.timings, timings)
+    assert again.others == 0.25
+    assert again.machine.keys() == {"processor", "architecture", "cores", "system"}
+    assert list(folder().iterdir()) == [measurement.path()]
+
+
+@pytest.mark.parametrize(
+    ("kept", "asked", "again"),
+    [("full", "short", False), ("short", "smoke", False), ("smoke", "short", True)],
+)
+def test_a_longer_measurement_serves_for_a_shorter_one(counted, kept, asked, again):
+    measurement.read_or_measure(kept)
+    found = measurement.read_or_measure(asked)
+    assert counted == ([kept, asked] if again else [kept])
+    assert found.length == (asked if again else kept)
+
+
+@pytest.mark.parametrize(
+    ("owner", "changed"),
+    [
+        (measurement, "machine"),
+        (measurement.provenance, "environment"),
+        (measurement.lock, "sources_hash"),
+        (measurement.lock, "code"),
+    ],
+    ids=lambda one: one if isinstance(one, str) else "",
+)
+def test_another_machine_version_or_source_measures_again(counted, monkeypatch, owner, changed):
+    measurement.read_or_measure("short")
+    monkeypatch.setattr(owner, changed, lambda *_: {"numba": "other"})
+    measurement.read_or_measure("short")
+    assert counted == ["short", "short"]
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "{}", '{"timings": 1}'])
+def test_a_damaged_file_is_told_and_measured_again(counted, capsys, content):
+    measurement.read_or_measure("short")
+    measurement.path().write_text(content)
+    measurement.read_or_measure("short")
+    assert counted == ["short", "short"]
+    assert "is damaged" in capsys.readouterr().err
+
+
+def test_what_was_timed_on_a_busy_machine_is_timed_again_where_calm_is_asked_for(counted, waited):
+    waited[0] = 0.5
+    measurement.read_or_measure("short")
+    measurement.read_or_measure("short")
+    assert counted == ["short"]
+    waited[0] = 0.0
+    (call,) = measurement.beforehand("short")
+    call()
+    call()
+    assert counted == ["short", "short"]
+
+
+def test_without_a_folder_to_keep_it_in_nothing_is_measured(counted):
+    folder().write_text("no folder")
+    with pytest.raises(StoreError, match="cannot be written"):
+        measurement.read_or_measure("short")
+    assert not counted
+
+
+@pytest.mark.parametrize("length", ["long", "", None, True, 3, ["full"]])
+@pytest.mark.parametrize("call", [measurement.read_or_measure, measurement.beforehand])
+def test_a_length_that_there_is_not_is_refused(counted, call, length):
+    with pytest.raises(ParameterError, match="must be one of smoke, short, full"):
+        call(length)
+    assert not counted
+
+
+def command(*words):
+    done = CliRunner().invoke(main, ["bench", *words])
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def test_the_command_prints_both_tables_and_measures_again_only_when_told(counted, monkeypatch):
+    monkeypatch.setattr(solves, "compare", lambda *_: pd.DataFrame({"median": [np.pi]}, ["fatrop"]))
+    shown = command("--short")
+    assert sum(" RDES " in line for line in shown.splitlines()) == 3
+    assert "fatrop    3.14" in shown
+    assert f"{measurement.path()}: short, " in shown
+    command("--smoke")
+    assert counted == ["short"]
+    command("--smoke", "--again")
+    assert counted == ["short", "smoke"]

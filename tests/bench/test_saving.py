@@ -1,0 +1,66 @@
+"""When a network saves time, from times whose curve is known."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.bench.learners import PAPER_SOLVE, ratio
+from nmpcrl.bench.saving import Saving, saving
+from nmpcrl.claims import published
+
+
+def model(**changed) -> Saving:
+    """Two solvers; a fit takes longer beside the slow one, which gains less from a warm start."""
+    parts = {
+        "solve": [0.05, 1.0],
+        "warm": [0.7, 0.8],
+        "network": [0.1, 0.2],
+        "rest": [0.02, 0.03],
+        "rest_rdes": [0.02, 0.05],
+    }
+    return Saving(**{name: np.array(one) for name, one in (parts | changed).items()})
+
+
+def test_the_paper_s_hours_are_0_83_s_a_solve():
+    assert pytest.approx(0.83, abs=0.005) == PAPER_SOLVE
+
+
+def test_the_ratio_of_the_learners_breaks_even_where_it_says_and_comes_down_to_what_u_allows():
+    two = model()
+    assert two.ratio(1e9) == pytest.approx(1 / 1.6)
+    assert two.ratio(1e9, warm=1.0) == pytest.approx(0.5)
+    assert two.ratio(two.break_even) == pytest.approx(1.0)
+
+
+def test_with_solves_that_take_alike_it_is_the_equation_without_u():
+    same = model(warm=[1.0, 1.0], network=[0.2, 0.2], rest=[0.03, 0.03], rest_rdes=[0.05, 0.05])
+    assert same.break_even == pytest.approx(0.22)
+    assert same.break_even_within == pytest.approx((0.22, 0.22))
+    assert (np.diff(same.ratio(np.geomspace(0.01, 1e3))) < 0).all()
+
+
+def test_the_break_even_lies_within_its_interval_whatever_way_leads_from_solver_to_solver():
+    low, high = model().break_even_within
+    assert low < model().break_even < high
+    assert (low, high) == pytest.approx((0.1 / 0.6, 0.22 / 0.4))
+    for early in (True, False):  # all changes at the fast end, or at the slow one
+        at = (0.051, 1.0) if early else (0.05, 0.999)
+        assert low <= model(solve=np.array(at)).break_even <= high
+
+
+def test_a_break_even_that_is_not_between_two_solvers_is_none():
+    slow = model(solve=[10.0, 100.0])
+    assert slow.break_even < 10
+    assert np.isnan(slow.break_even_within).all()
+    free = model(network=[0.0, 0.0], rest_rdes=[0.0, 0.0], rest=[0.02, 0.02])
+    assert free.break_even == 0
+    never = model(warm=[0.4, 0.4])
+    assert never.break_even == np.inf
+    assert np.isnan(never.break_even_within).all()
+
+
+def test_the_curve_goes_through_the_published_ratios():
+    """And so a bar of parts ends at the ratio that is written beside it."""
+    timings = published.load().timings
+    for row in timings[timings.learner == "RDES"].itertuples():
+        measured = ratio(timings, row.solver, "RDES").value
+        assert saving(timings).ratio(row.ms_per_solve) == pytest.approx(measured, rel=1e-6)
