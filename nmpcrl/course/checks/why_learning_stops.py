@@ -120,6 +120,6 @@ def feedback(answer: Any) -> Outcome:
 
 
 def fed_back(predict: Any, theta: Vector, phi: Vector, gamma: float, probe: float = 1e-5) -> float:
-    """Eq. (12.3), by central differences along phi."""
+    """Eq. (10.3), by central differences along phi."""
     ahead, behind = predict(theta + probe * phi), predict(theta - probe * phi)
     return float(gamma * (ahead - behind) / (2 * probe * (phi @ phi)))
