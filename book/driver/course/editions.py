@@ -25,13 +25,13 @@ c.ExecutePreprocessor.timeout = 600  # [s] of one cell
 
 
 def student(source: Notebook, pages: Collection[str]) -> Notebook:
-    """A chapter without solutions; a check that fails does not stop the notebook.
+    """A chapter without solutions, as nbgrader releases it; a failing check does not stop it.
 
     Args:
         source: the chapter.
         pages: the files that lie beside it: links to others become words.
     """
-    notebook = _without_solutions(teacher(source, pages))
+    notebook = for_nbgrader(source, pages)
     clear_solutions(notebook)
     return notebook
 
