@@ -13,7 +13,7 @@ from nmpcrl.claims.published import Evidence, load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.parameters import TRUTH, one_of
+from nmpcrl.study.parameters import one_of
 from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.setup import controller_of
 from nmpcrl.study.store import Runs
@@ -27,13 +27,6 @@ def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
     one_of(("published", "fresh")).check("study", source)
     runs, known = _asked(**asked), load().summaries
     return tuple(e for e in runs if source == "fresh" or e not in known)
-
-
-def repeatable(repeat: bool, **asked: Any) -> tuple[Experiment, ...]:
-    """The published runs of `design.fresh` for a build to train again, if `repeat` holds."""
-    again = set(design.fresh()) if TRUTH.check("repeat", repeat) else set()
-    known = load().summaries
-    return tuple(e for e in _asked(**asked) if e in again and e in known)
 
 
 def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:

@@ -133,7 +133,7 @@ _CLAIMS: tuple[Claim, ...] = (
         " stable throughout training episodes”, of RDES (Section IV-B)",
         question="Did DES diverge, and RDES with the same layout, decay and seed not?",
         measured="whether the run was stopped; median training cost of the last 20 episodes over"
-        " that of the frozen arm under the same noise",
+        " that of the baseline without learning under the same noise",
         border=f"diverged: stopped, or above {thresholds.DIVERGED}",
         would_change="Other layouts and the untold details of the network; Algorithm 1 read"
         " literally (departure G).",
@@ -144,7 +144,7 @@ _CLAIMS: tuple[Claim, ...] = (
         worst="had to be stopped",
         numbers=partial(_contrasted, thresholds.divergence, "cost_ratio"),
         nothing=1.0,
-        label="training cost / frozen arm's",
+        label="training cost / baseline's",
         borders=np.geomspace(1.02, 15, UP_TO),
     ),
     Contrast(

@@ -8,7 +8,6 @@ probability p, most of three fail in at most 1.2 % of all cases, whatever p is.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
@@ -25,7 +24,7 @@ from nmpcrl.claims.paper_claims import BY_RUNS, BY_TIME, WIDER_CLAIMS
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.rule import judge
 from nmpcrl.claims.verdict import Verdict, differ
-from nmpcrl.study import design, lock, provenance
+from nmpcrl.study import lock, provenance
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import seconds_of
@@ -151,29 +150,6 @@ def _verdicts(
     paths = {e: one.states for e, one in mine.items()}
     claims = BY_RUNS | WIDER_CLAIMS | OWN_CLAIMS
     return judge(claims, table(mine), paths), judge(claims, there.runs, there.paths)
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """Published runs made again on this machine."""
-
-    runs: int
-    equal: int  # with every published number in every digit
-    close: int  # of the others, with every number to `EXACT`
-    here: tuple[Verdict, ...]  # on these runs alone
-    there: tuple[Verdict, ...]  # on the published runs of the same layouts and readings
-
-
-def agreement(fresh: Mapping[Experiment, RunSummary], published: Published) -> Agreement:
-    """The agreement of runs made here with the published main table; other runs are skipped."""
-    mine = {e: one for e, one in fresh.items() if published.variants.get(e) == design.MAIN_TABLE}
-    pairs = [
-        [[float(one[name]) for name in NUMBERS] for one in (row(run), published.rows[e])]
-        for e, run in mine.items()
-    ]
-    differing = [(here, there) for here, there in pairs if here != there]
-    close = sum(np.allclose(*pair, rtol=EXACT, atol=EXACT) for pair in differing)
-    return Agreement(len(mine), len(mine) - len(differing), close, *_verdicts(mine, published))
 
 
 class Proof(NamedTuple):

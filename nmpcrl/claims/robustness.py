@@ -13,8 +13,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nmpcrl.analysis.statistics import paired_p
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import CELL, Observations, Paths
+from nmpcrl.claims.rule import CELL, Observations, Paths, arms
+from nmpcrl.claims.thresholds import divergence
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -83,6 +85,34 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
                 both = (claim.settled(one) for one in (after, before))
                 rows.append(_row(name, claim.name, *((v.outcome, v.counts["all"]) for v in both)))
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def readings_of_des(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
+    """How often DES diverges when its description (departure I) is read otherwise, and C1 then.
+
+    Returns:
+        By variant: changed (in words), diverged (runs of DES, and all), main (the same of the main
+        table in the same cells), gained and lost (pairs of which only one diverged), p_diverged (of
+        these, by `paired_p`), outcome and base (of C1 with each) and changes.
+    """
+    names = [name for name, one in design.VARIANTS.items() if one.departure == "I"]
+    asked = runs[runs.variant.isin([MAIN_TABLE, *names])]
+    judged = variant_changes(asked, paths).query("claim == 'C1'").set_index("variant")
+    rows = {}
+    for name in judged.index:
+        here, base = (divergence(arms(group, "DES")[0]) for group in groups(asked, name))
+        both = pd.DataFrame({"here": here, "base": base}).dropna().astype(bool)
+        gained, lost = int((both.here & ~both.base).sum()), int((both.base & ~both.here).sum())
+        rows[name] = {
+            "changed": design.VARIANTS[name].changed,
+            "diverged": (int(both.here.sum()), len(both)),
+            "main": (int(both.base.sum()), len(both)),
+            "gained": gained,
+            "lost": lost,
+            "p_diverged": paired_p(gained, lost),
+            **judged.loc[name, ["outcome", "base", "changes"]],
+        }
+    return pd.DataFrame.from_dict(rows, orient="index")
 
 
 def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:

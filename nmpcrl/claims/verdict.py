@@ -1,4 +1,4 @@
-"""The outcome of a claim and the numbers behind it, as data; `report.verdicts` writes sentences."""
+"""The outcome of a claim and the numbers behind it, as data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

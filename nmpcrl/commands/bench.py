@@ -43,10 +43,10 @@ def _publish_timing() -> None:
     """Measure and publish the verdicts on time, if they can be decided on this machine."""
     from nmpcrl.claims.publish import publish_timing
     from nmpcrl.claims.verdict import UNDECIDABLE
-    from nmpcrl.report.verdicts import evidence
 
     judged = publish_timing()
     for verdict in judged:
-        click.echo(f"{verdict.claim}: {verdict.outcome}. {evidence(verdict)}")
+        ratios = ", ".join(f"{ratio} with {solver}" for solver, ratio in verdict.numbers.items())
+        click.echo(f"{verdict.claim}: {verdict.outcome}. In steps of ES: {ratios}")
     if UNDECIDABLE in {verdict.outcome for verdict in judged}:
         raise click.ClickException("nothing is published: try again when the machine is idle")

@@ -21,9 +21,21 @@ ROOT = Path(nmpcrl.__file__).parents[1]
 PLACEHOLDER = re.compile(r"(?<![\w\\^}\])])\{([^\W\d]\w*)(?::([^{}]*))?\}")
 
 
-def say(template: str, *, origin: str = "", **numbers: Any) -> None:
-    """Display a paragraph of Markdown with its numbers filled in, as `filled` does."""
-    _show(filled(template, origin=origin, **numbers))
+ELSEWHERE = "This paragraph is about the book's own run."
+
+
+def say(template: str, *, when: bool = True, origin: str = "", **numbers: Any) -> None:
+    """Display a paragraph of Markdown with its numbers filled in, as `filled` does.
+
+    Args:
+        template: Markdown.
+        when: whether the runs are those that the paragraph interprets: of other runs it might tell
+            what did not happen, so that one line says that it is about the book's own.
+        origin: as in `filled`.
+        numbers: by name.
+    """
+    text = filled(template, origin=origin, **numbers)
+    _show(text if when else ELSEWHERE)
 
 
 def filled(template: str, *, origin: str = "", **numbers: Any) -> str:
@@ -49,6 +61,8 @@ def filled(template: str, *, origin: str = "", **numbers: Any) -> str:
         name, form = found[1], found[2] or ""
         value = numbers[name]
         words = format(value, form)
+        if is_number(value):  # the cost of a run that failed is infinite
+            words = words.replace("inf%", "∞").replace("inf", "∞")
         if not origin or not is_number(value) or _in_formula(found):
             return words
         return cited(words, value, f"{name.replace('_', ' ')}: {origin}")

@@ -24,10 +24,8 @@ from nmpcrl.claims.verdict import (
     Verdict,
 )
 from nmpcrl.report.cited import Cited, cited
-from nmpcrl.report.halves import own
 from nmpcrl.report.text import SURE, audit_place, departure_link, listed
 from nmpcrl.report.timing import ratios_at_paper_speed, to_es
-from nmpcrl.report.verdicts import evidence as sentences
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -67,7 +65,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     others = {v.claim: v for v in beside}
     rows = (
         (
-            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}{_own(v)}",
+            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}",
             _outcome(v),
             *([_outcome(others[v.claim], "runs of this page")] if others else []),
         )
@@ -175,16 +173,6 @@ def timing_table(timings: pd.DataFrame, machine: str) -> str:
     return html_table(f"Times of a learning step on {machine}.", header, rows, headed=True)
 
 
-def evidence(verdicts: Iterable[Verdict]) -> str:
-    """One item a claim, in Markdown: verdict, evidence, and where it would change."""
-    return "\n\n".join(
-        f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_labelled(v)} {sentences(v)}{_anew(v)}\n\n"
-        f"  *Where it would change.* {_linked(v.would_change)}"
-        for v in verdicts
-    )
-
-
 def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
     """One row a claim, in Markdown: its verdict, and what changes it, by departure.
 
@@ -202,17 +190,6 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
         outcome = f"{_word(v.outcome)}{_share(v)}"
         rows.append(f"| **{v.claim}** {v.statement} | {outcome} | {'<br>'.join(by) or 'nothing'} |")
     return "\n".join(rows)
-
-
-def scope(runs: pd.DataFrame) -> str:
-    """What the runs of `rows.table` cover, in a sentence."""
-    names = ("layout", "seed", "decay", "episodes")
-    layouts, seeds, readings, episodes = (tuple(runs[name].unique().tolist()) for name in names)
-    return (
-        f"Judged from {len(runs)} runs of {listed(episodes)} episodes: {_named('layout', layouts)};"
-        f" {_named('seed', seeds)}; exploration that decays"
-        f" {listed(f'per {reading}' for reading in readings)}."
-    )
 
 
 def departure(letter: str) -> str:
@@ -270,9 +247,9 @@ def _word(outcome: Outcome | None) -> str:
 
 
 def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
-    """The share, or ratio, on which a verdict rests, below its badge: see `text.legend`.
+    """The share, or ratio, on which a verdict rests, below its badge.
 
-    Its interval is for other seeds, or other steps; below it, the one for layouts drawn anew.
+    Its interval is for other seeds, or other steps; below it, the one for other layouts.
     """
     if verdict.interval is None:
         return ""
@@ -281,15 +258,9 @@ def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
     number, kind = Estimate(value, *verdict.interval), "ratio" if form == ".2f" else "share"
     lines = [cited(format(number, form), number, f"{verdict.claim}, {kind}: {source}")]
     if not isnan((other := anew(verdict)).low):
-        what = f"{verdict.claim}, share with layouts drawn anew: {source}"
-        lines += ["layouts anew", cited(f"[{other.low:.0%}, {other.high:.0%}]", other, what)]
+        what = f"{verdict.claim}, share in other layouts: {source}"
+        lines += ["other layouts", cited(f"[{other.low:.0%}, {other.high:.0%}]", other, what)]
     return "".join(f"<br>{line}" for line in lines)
-
-
-def _anew(verdict: Verdict) -> str:
-    """The interval for layouts drawn anew, as a sentence after the evidence."""
-    other = anew(verdict)
-    return "" if isnan(other.low) else f" For layouts drawn anew: {other:.0%}."
 
 
 def _in_two_lines(ratio: Cited) -> str:
@@ -327,12 +298,6 @@ def _aside(verdict: Verdict) -> str:
     return "<em>Taken for granted:</em> " if implied else ""
 
 
-def _own(verdict: Verdict) -> str:
-    """Below a claim on two learners: how often each went wrong."""
-    said = own(verdict)
-    return f"<br><em>{_text(said)}</em>" if said else ""
-
-
 def _letter(letter: str) -> str:
     """A link to a departure; the paper is clear about what has none."""
     return departure_link(letter, letter) if letter else "beside the departures"
@@ -346,14 +311,6 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def _linked(text: str) -> str:
-    """Turn the letter of a departure into a link to its entry."""
+def linked(text: str) -> str:
+    """Markdown in which "departure C" is a link to its entry."""
     return re.sub(r"\b(departure ([A-Z]))\b", lambda it: departure_link(it[1], it[2]), text)
-
-
-def _named(name: str, values: tuple[object, ...]) -> str:
-    """ "seed 3", "layouts A and B", "seeds 0 to 9"."""
-    several = "s" if len(values) > 1 else ""
-    if len(values) > 2 and values == tuple(range(len(values))):
-        return f"{name}{several} 0 to {values[-1]}"
-    return f"{name}{several} {listed(values)}"

@@ -7,7 +7,7 @@ open. A variant changes one other field.
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
-from itertools import chain, product
+from itertools import product
 from math import prod
 from typing import Any
 
@@ -92,13 +92,6 @@ def solver_pair(experiment: Experiment) -> tuple[Experiment, Experiment]:
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
 SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
-# What a build trains again: all learners, in the chapters' layout in both readings and with as many
-# seeds as `claims.reproduce.FEWEST`, and in every other layout in one reading and with one seed.
-FRESH: tuple[dict[str, Any], ...] = (
-    {"layouts": ("A",), "seeds": (0, 1, 2)},
-    {"layouts": ("B", "E"), "decays": ("step",), "seeds": (0,)},
-    {"layouts": ("C", "D", "F"), "decays": ("episode",), "seeds": (0,)},
-)
 MAIN_TABLE = "main"
 IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
 
@@ -163,11 +156,6 @@ def main_table(
 ) -> tuple[Experiment, ...]:
     """Every learner in every layout, in both readings of the decay, with every seed."""
     return sweep(learner=learners, layout=layouts, decay=decays, seed=seeds, episodes=episodes)
-
-
-def fresh() -> tuple[Experiment, ...]:
-    """The runs of the main table that `make book` trains on the reader's machine."""
-    return tuple(dict.fromkeys(chain.from_iterable(main_table(**part) for part in FRESH)))
 
 
 def controls() -> tuple[Experiment, ...]:

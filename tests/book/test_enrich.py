@@ -88,7 +88,7 @@ def test_a_cell_of_prose_only_imports_and_shows(code, expected):
 
 def test_a_page_takes_what_a_cell_of_a_notebook_displayed():
     cell = new_code_cell("table()", metadata={"tags": ["verdicts"]})
-    link = '<a href="for_reviewers.{}#reviewers-c1">'
+    link = '<a href="evidence.{}#evidence-c1">'
     cell.outputs = [displayed(text_html=f"<table>{link.format('ipynb')}</table>")]
     book = new_notebook(cells=[new_code_cell("x"), cell])
     page = prose.filled(

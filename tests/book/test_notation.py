@@ -7,11 +7,13 @@ from importlib import import_module
 from pathlib import Path
 
 import click
+import nbformat
 import pytest
 from driver import project
 from driver.build import chapters
 
 from nmpcrl.commands import main
+from nmpcrl.report import prose
 from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,10 +105,7 @@ def test_a_line_of_the_ocp_that_chapter_1_explains_is_marked_in_the_equation():
 
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
-    named = (
-        "solver|performance|other_problems|what_to_try_first|why_learning_stops|changing_world|for_reviewers"
-        "|paper_and_book"
-    )
+    named = "solver|performance|other_problems|what_to_try_first|why_learning_stops|changing_world"
     pages = rf"\d\d_\w+|{named}|your_\w+"
     rows = re.findall(rf"^\| `({pages})` \| (.*) \|$", REPRODUCE, flags=re.M)
     listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
@@ -154,3 +153,17 @@ def test_the_make_targets_that_the_page_lists_exist():
     targets = set(re.findall(r"^(\w+):", makefile, flags=re.M))
     listed = set(re.findall(r"^\| `make (\w+)", REPRODUCE, flags=re.M))
     assert listed == targets - {"help"}
+
+
+@pytest.mark.parametrize("table", ["table-1", "text-numbers"])
+def test_a_number_that_is_not_the_papers_has_a_departure(table, monkeypatch):
+    page = nbformat.read(ROOT / "book/departures.ipynb", as_version=4)
+    cells, names, shown = {cell.id: cell.source for cell in page.cells}, {}, []
+    monkeypatch.setattr(prose, "_show", shown.append)
+    for cell in ("table-1-numbers", "text-numbers", f"{table}-said"):
+        exec(cells[cell], names)
+    rows = [line[1:-1].split("|") for line in shown[0].splitlines() if line.startswith("|")][2:]
+    assert len(rows) == 9
+    for what, printed, here, differs in rows:
+        same = printed.replace(r"$\pi/2$", "1.571").replace(" m,", ",").strip() == here.strip()
+        assert same or "#departure-" in differs, what

@@ -37,8 +37,6 @@ OWN = [name for name in NOTEBOOKS if name.startswith("your_")]  # a reader's own
 GIVEN = [
     *CHAPTERS,
     *OWN,
-    "for_reviewers",
-    "paper_and_book",
     "other_problems",
     "what_to_try_first",
     "why_learning_stops",
@@ -321,7 +319,6 @@ MAY_BE = {  # what is drawn for a parameter, so that it is sometimes right
     "horizon": st.integers(-1, 30) | st.integers(),
     "seed": st.integers(),
     "study": st.sampled_from(["fresh", "published", "stale"]),
-    "repeat": st.sampled_from([True, False, "no", 1]),
     "budget": st.integers(0, 10**7),
     "entry": st.sampled_from(["ES", "CMA-ES", "SARSA"]),
     "overshot": st.lists(st.sampled_from([*paper.LAYOUTS, "Z"]), max_size=3, unique=True),

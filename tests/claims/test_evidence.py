@@ -7,8 +7,7 @@ from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.claims import evidence, publish, published
 from nmpcrl.claims.evidence import gather, needed
-from nmpcrl.study import ParameterError
-from nmpcrl.study.design import fresh, main_table
+from nmpcrl.study.design import main_table
 from nmpcrl.study.experiment import frozen_arm
 
 ASKED = {"learners": ["ES"], "layouts": ["A"], "seeds": [0], "episodes": 2}
@@ -37,18 +36,6 @@ def test_missing_runs_are_trained_with_their_frozen_arms(known):
     assert set(needed("fresh", **ASKED)) == set(known)
     lacking = set(needed("published", **MORE))
     assert lacking == {*main_table(both, ["A"], [1], 2)} == {*map(frozen_arm, lacking), *lacking}
-
-
-def test_a_build_trains_the_published_runs_of_the_design_again(monkeypatch):
-    runs = main_table(["ES", "frozen"], ["A", "F"], [0, 1])
-    monkeypatch.setattr(evidence, "load", lambda: published.Published(dict.fromkeys(runs)))
-    again = evidence.repeatable(True, learners=["ES"], layouts=["A", "F"], seeds=[0, 1])
-    assert set(again) == set(runs) & set(fresh())
-    assert {(e.layout, e.seed) for e in again} == {("A", 0), ("A", 1), ("F", 0)}
-    assert evidence.repeatable(True, learners=["ES"], layouts=["A"], seeds=[0], episodes=4) == ()
-    assert evidence.repeatable(False, learners=["ES"], layouts=["A"], seeds=[0]) == ()
-    with pytest.raises(ParameterError, match="repeat = 'no' must be true or false"):
-        evidence.repeatable("no")
 
 
 def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_are_stored(known):

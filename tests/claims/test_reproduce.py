@@ -182,20 +182,6 @@ def test_runs_do_not_contradict_themselves_nor_a_part_the_whole(made_up):
     assert of_runs(whole, published_of(whole)) == of_runs(part, published_of(whole)) == ()
 
 
-def test_published_runs_made_again_are_counted_by_how_equal_they_are(study):
-    found = study()
-    first, second, third, *_ = (e for e in found if e.learner != "frozen")
-    known = published_of(
-        found
-        | {first: scaled(moved(found[first]), 1 + 1e-9, 0), second: scaled(found[second], 2.0)}
-    )
-    made = reproduce.agreement(found, with_part(known, third, "N = 5"))
-    assert (made.runs, made.equal, made.close) == (len(found) - 1, len(found) - 3, 1)
-    every = ["C1", "C2", "C5", "C6", "C7", "C9", "W7", "W9", "B1", "B2", "B3", "B4"]
-    assert [one.claim for one in made.here] == [one.claim for one in made.there] == every
-    assert reproduce.agreement({}, Published()) == reproduce.Agreement(0, 0, 0, (), ())
-
-
 SHORT = {"episodes": 2, "steps": 3, "evaluate_every": 1}
 MAIN = sweep(learner=("ES", "GES"), seed=(0, 1, 2), **SHORT)
 OTHER = sweep(learner="ES", horizon=5, seed=(0, 1), **SHORT)

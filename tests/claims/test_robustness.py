@@ -6,9 +6,19 @@ import pytest
 from builders import quiet_row
 
 from nmpcrl.analysis.rows import experiment_of
+from nmpcrl.analysis.statistics import paired_p
+from nmpcrl.claims import evidence
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.robustness import WHOLE, departure, groups, part_changes, robustness_map
+from nmpcrl.claims.robustness import (
+    WHOLE,
+    departure,
+    groups,
+    part_changes,
+    readings_of_des,
+    robustness_map,
+)
 from nmpcrl.claims.rule import judge
+from nmpcrl.claims.thresholds import divergence
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import Experiment, design
 from nmpcrl.study.departures import DEPARTURES
@@ -116,3 +126,20 @@ def test_runs_that_are_too_short_decide_nothing_and_change_nothing(runs, paths):
     cut = robustness_map(runs.assign(episodes=4), paths)
     assert set(cut.outcome) == {UNDECIDABLE}
     assert not cut.changes.any()
+
+
+def test_how_often_des_diverges_is_tested_on_its_own_and_not_by_the_p_of_the_claim():
+    known = evidence.gather("published", variants=True)
+    versions, runs = readings_of_des(known.runs, known.paths), known.runs
+    assert list(versions.index) == ["lagged", "averaged", "greedy", "late"]
+    found = versions.loc["averaged"]
+    other, main = (
+        divergence(one).set_axis(one.set_index(["layout", "decay", "seed"]).index).astype(bool)
+        for one in (
+            runs[(runs.variant == name) & (runs.learner == "DES")] for name in ("averaged", "main")
+        )
+    )
+    main = main[other.index]
+    assert (found.diverged, found.main) == ((other.sum(), 60), (main.sum(), 60))
+    assert (found.gained, found.lost) == ((other & ~main).sum(), (main & ~other).sum())
+    assert found.p_diverged == paired_p(found.gained, found.lost)

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -34,7 +34,6 @@ from nmpcrl.claims import (
     thresholds,
 )
 from nmpcrl.claims.verdict import REPRODUCED
-from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import drawn as drawn_report
 from nmpcrl.report import worlds as world_report
 from nmpcrl.studies import agents, interventions, other_problems, population, remedies, worlds
@@ -171,7 +170,7 @@ def robustness_map() -> Any:
 
 @entry("study")
 def readings_of_DES() -> Any:
-    return baselines.baselines(every().runs, six_paths())
+    return robustness.readings_of_des(every().runs, six_paths())
 
 
 @entry("study")
@@ -184,7 +183,15 @@ def failure_modes() -> Any:
 @entry("study")
 def runs_that_went_wrong() -> Any:
     kinds = {"diverged": thresholds.divergence, "unstable": thresholds.instability}
-    return {name: whole_study.went_wrong(one, PAPER) for name, one in kinds.items()}
+    runs, found = study().main.runs, {}
+    runs = runs[runs.learner.isin(PAPER)]
+    for name, wrong in kinds.items():
+        cells = runs.assign(wrong=wrong(runs)).pivot_table(
+            "wrong", ["decay", "learner"], "layout", "sum", sort=False
+        )
+        each = runs.groupby(["decay", "learner"]).size()
+        found[name] = cells.assign(**{"all layouts": cells.sum(axis=1), "runs": each}).astype(int)
+    return found
 
 
 @entry("study")
@@ -662,7 +669,12 @@ def keys_of_runs() -> dict[Any, tuple[str, str]]:
 def keys() -> Any:
     parts, wanted = design.whole_study(), dict.fromkeys(reproduce.sample(study().variants, 60))
     first = {part: e for e, part in reversed(parts.items())}
-    wanted |= dict.fromkeys([*design.fresh(), *first.values()])
+    some = (
+        design.main_table(layouts=["A"], seeds=[0, 1, 2]),
+        design.main_table(layouts=["B", "E"], decays=["step"], seeds=[0]),
+        design.main_table(layouts=["C", "D", "F"], decays=["episode"], seeds=[0]),
+    )
+    wanted |= dict.fromkeys([*chain.from_iterable(some), *first.values()])
     known = keys_of_runs()
     return {
         f"{parts[e]}: {e.learner} {e.layout} {e.decay} {e.seed}": [one[:16] for one in known[e]]

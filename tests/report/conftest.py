@@ -5,13 +5,11 @@ import json
 import re
 from collections.abc import Callable, Iterator
 
-import pandas as pd
 import pytest
 from legibility import flaws
 from matplotlib.figure import Figure
 
 from nmpcrl.report.figures import sheet
-from nmpcrl.study import Experiment
 
 COUNTED = ("episode", "episodes trained", "noise-free RL cost", "relative")  # have no unit
 
@@ -82,16 +80,3 @@ def assert_readable(texts) -> Callable[[Figure], None]:
 def data(shown) -> dict:
     """What the script of a live figure is given, whose HTML is `shown`."""
     return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
-
-
-@pytest.fixture
-def some_stopped(made_up) -> pd.DataFrame:
-    """Of 16 runs, four of RDES and one of DES are stopped; two of RDES enter an obstacle."""
-
-    def unlike(e: Experiment) -> dict:
-        stopped = e.learner == "RDES" or (e.learner, e.seed, e.decay) == ("DES", 0, "step")
-        return {"reached": 40} if stopped else {}
-
-    runs = made_up(unlike, layouts=("A",), seeds=(0, 1)).runs
-    runs.loc[(runs.learner == "RDES") & (runs.seed == 1), "eval_worst_overlap"] = 0.2
-    return runs

@@ -40,6 +40,18 @@ def test_a_number_is_written_as_its_placeholder_says():
     )
 
 
+def test_the_cost_of_a_run_that_failed_is_written_as_infinite():
+    assert filled("{a:.1%}, {b:.2f}, {c}", a=np.inf, b=-np.inf, c="an inf") == "∞, -∞, an inf"
+
+
+@pytest.mark.parametrize(("when", "said"), [(True, "It fell by 3 %."), (False, prose.ELSEWHERE)])
+def test_of_other_runs_one_line_stands_in_the_place_of_an_interpretation(when, said, monkeypatch):
+    shown = []
+    monkeypatch.setattr(prose, "_show", shown.append)
+    say("It fell by {fall} %.", when=when, fall=3)
+    assert shown == [said]
+
+
 @pytest.mark.parametrize(
     ("value", "digits", "said"),
     [
@@ -73,7 +85,7 @@ def test_the_braces_of_latex_are_no_placeholders():
     assert filled(LATEX) == LATEX
 
 
-@given(before=WORDS, after=WORDS, number=st.floats(allow_nan=False))
+@given(before=WORDS, after=WORDS, number=st.floats(allow_nan=False, allow_infinity=False))
 def test_what_stands_around_a_number_is_kept(before, after, number):
     template = f"a{before} {{number:.3e}}{after}z"
     assert filled(template, number=number) == f"a{before} {number:.3e}{after}z"

@@ -1,7 +1,7 @@
 """What pages show of verdicts, assumptions and departures."""
 
 import re
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -16,12 +16,10 @@ from nmpcrl.claims.verdict import (
     REPRODUCED,
     UNDECIDABLE,
     Assumption,
-    Halves,
     Verdict,
 )
-from nmpcrl.report import halves, tables
+from nmpcrl.report import tables
 from nmpcrl.report.text import departure_link
-from nmpcrl.study import paper_runs
 from nmpcrl.study.departures import DEPARTURES
 
 OUTCOMES = (REPRODUCED, PARTLY, NOT, UNDECIDABLE)
@@ -49,7 +47,6 @@ def test_a_guarantee_that_does_not_apply_has_not_the_badge_of_what_is_not_reprod
     c8 = replace(verdict(NOT), claim="C8", said=words)
     badge = f'<span class="verdict-not-applicable">{words}</span>'
     assert badge in tables.verdict_table([c8], "All of it.")
-    assert badge in tables.evidence([c8])
     assert tables.BADGES[NOT] in tables.verdict_table([replace(c8, said="not confirmed")], "All.")
 
 
@@ -57,13 +54,6 @@ def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
     shares = {"share": 0.75, "interval": (0.5, 0.875)}
     judged = cells(tables.verdict_table([verdict(PARTLY, **shares), verdict(NOT)], "All of it."))
     assert [row[1] for row in judged[1:]] == [f"{PARTLY}|75% [50%, 88%]", NOT]
-
-
-def test_how_often_each_of_two_learners_went_wrong_is_said_below_the_claim():
-    step = Halves(("DES", "RDES"), "diverged", "step", 9, (9, 0), 0, 9)
-    one = replace(verdict(PARTLY), halves=(step, replace(step, wrong="had to be stopped")))
-    _, (claim, _) = cells(tables.verdict_table([one], "All of it."))
-    assert claim.endswith(f"|{halves.own(one)}")
 
 
 def test_the_verdicts_of_other_runs_have_a_column_of_their_own():
@@ -139,29 +129,6 @@ def test_an_assumption_says_in_words_whether_it_holds():
         [Assumption("x", "y", holds=True), Assumption("x", "y", holds=False)], "Audit."
     )
     assert re.findall(r">(holds|does not hold)<", table) == ["holds", "does not hold"]
-
-
-def test_the_evidence_links_to_departures():
-    assert departure_link("departure G", "G") in tables.evidence([verdict(NOT)])
-
-
-def runs(seeds) -> pd.DataFrame:
-    return pd.DataFrame([asdict(one) for one in paper_runs(episodes=7, seeds=seeds)])
-
-
-def test_the_scope_names_layout_seeds_readings_and_length():
-    assert tables.scope(runs((3, 5))) == (
-        "Judged from 20 runs of 7 episodes: layout A; seeds 3 and 5; exploration that decays per"
-        " step and per episode."
-    )
-
-
-@pytest.mark.parametrize(
-    ("seeds", "said"),
-    [((3,), "seed 3"), (tuple(range(10)), "seeds 0 to 9"), ((1, 2, 3), "seeds 1, 2 and 3")],
-)
-def test_the_scope_of_one_seed_is_in_the_singular_and_of_many_a_range(seeds, said):
-    assert f"layout A; {said}; exploration" in tables.scope(runs(seeds))
 
 
 @pytest.mark.parametrize("letter", DEPARTURES)

@@ -6,7 +6,6 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from nmpcrl.claims.reproduce import FEWEST
 from nmpcrl.study import Experiment, ParameterError, design, run, sweep
 from nmpcrl.study.experiment import MAIN, PAPER, frozen_arm
 from nmpcrl.study.learners import DECAYS
@@ -85,19 +84,6 @@ def test_the_study_begins_with_the_main_table_and_names_every_run_once():
     assert set(names[: len(TABLE)]) == {design.MAIN_TABLE}
     assert set(names[len(TABLE) :]) == {"controls", *design.VARIANTS}
     assert {frozen_arm(e) for e in STUDY} <= set(STUDY)
-
-
-def test_fresh_runs_meet_every_layout_and_both_readings_with_every_learner():
-    """So that the learners of a cell can be compared, and a check of ranges has enough seeds."""
-    fresh = set(design.fresh())
-    assert fresh < TABLE
-    cells = Counter((e.layout, e.decay, e.seed) for e in fresh)
-    assert set(cells.values()) == {len(MAIN)}
-    assert {layout for layout, _, _ in cells} == set(design.LAYOUTS)
-    seeds = Counter((layout, decay) for layout, decay, _ in cells)
-    assert [seeds["A", decay] for decay in DECAYS] == [FEWEST, FEWEST]
-    elsewhere = Counter(decay for layout, decay in seeds if layout != "A")
-    assert sorted(elsewhere.values()) == [2, 3]
 
 
 @pytest.mark.parametrize("name", design.VARIANTS)

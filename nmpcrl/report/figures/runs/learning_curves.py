@@ -18,11 +18,9 @@ from nmpcrl import Vector
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.thresholds import divergence, instability
-from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.report.figures.axes import label_panel, legend
 from nmpcrl.report.figures.panels import part, ranges, sourced
-from nmpcrl.report.figures.style import BAND, SUBTITLE, page, subplots
-from nmpcrl.report.tables import WORDS
+from nmpcrl.report.figures.style import BAND, page, subplots
 from nmpcrl.study.store import Runs
 
 CEILING = 4.0  # times theta_init's cost without noise, where the scale ends
@@ -44,27 +42,6 @@ def figure_2(found: Evidence, layout: str) -> Figure:
     counts = _counted(drawn, instability, ("ES", "GES"))
     result: Figure = _learning_curves(drawn, f"Instability in layout {layout}: {counts} runs")
     return result
-
-
-@page
-def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> Figure:
-    """Cost without noise in every layout, a row a reading, and what the claim came to there."""
-    drawn = part(found, learners)
-    layouts, decays = found.summaries.values_of("layout"), found.summaries.values_of("decay")
-    options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "across": 3}
-    figure, axes = subplots(len(decays), len(layouts), 1.6 * len(decays) + 1.1, **options)
-    for column, layout in zip(axes.T, layouts, strict=True):
-        for axis, decay in zip(column, decays, strict=True):
-            runs = drawn.summaries.select(layout=layout, decay=decay)
-            _costs(axis, runs, learners, judged)
-        label_panel(column[-1])
-        word = WORDS[verdict.by_layout.get(layout, UNDECIDABLE)]
-        column[0].set_title(f"{layout}: {word}", **SUBTITLE)
-    axes[0, 0].xaxis.set_major_locator(MaxNLocator(2, integer=True))
-    for axis, decay in zip(axes[:, 0], decays, strict=True):
-        axis.set_ylabel(f"cost / at the start\n(noise per {decay})", fontsize="small")
-    legend(figure, learners)
-    return sourced(figure, f"Does {verdict.claim} hold? {_spelled(verdict)}", drawn)
 
 
 def trained(summary: RunSummary) -> tuple[Vector, Vector]:
@@ -121,14 +98,6 @@ def _costs(axis: Axes, runs: Runs[RunSummary], learners: Iterable[str], curve: C
         }
         axis.text(0.01, STRIP[1], f"> {CEILING:g}", **above)
     axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-
-
-def _spelled(verdict: Verdict) -> str:
-    """The layouts by outcome: "no in A and D, yes in B"."""
-    found: dict[str, list[str]] = {}
-    for layout, outcome in verdict.by_layout.items():
-        found.setdefault(WORDS[outcome], []).append(layout)
-    return "; ".join(f"{word} in {', '.join(layouts)}" for word, layouts in found.items())
 
 
 def _counted(

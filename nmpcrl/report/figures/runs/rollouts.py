@@ -18,7 +18,6 @@ from nmpcrl.report.figures.axes import draw_task, legend, map_grid
 from nmpcrl.report.figures.panels import bundle, part, sourced
 from nmpcrl.report.figures.style import LIMIT, LOOKS, SUBTITLE, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.store import Runs
 
@@ -50,20 +49,6 @@ def controls(found: Evidence, layout: str) -> Figure:
     )
     left = f"; {outside} inputs leave their bounds" * bool(outside)
     return sourced(figure, f"RDES and GES use up to {parts} allowed{left}", drawn)
-
-
-@page
-def states(found: Evidence, layout: str) -> Figure:
-    """Fig. 4 of the paper against time: the states under the learned policies."""
-    drawn = _finished(part(found, SHOWN, layout))
-    task, plant = paper.task(layout), paper.nmpc(layout).plant
-    figure, axes = _against_time(drawn, "states", plant.state_names, 4.8)
-    for i, axis in enumerate(axes):
-        axis.axhline(task.target[i], **LIMIT)
-    ends = np.array([task.distance(summary.states[-1]) for summary in _learned(drawn)])
-    arrived = int((ends <= ARRIVED).sum())
-    title = f"{arrived} of {ends.size} rollouts of RDES and GES end at the target"
-    return sourced(figure, f"In layout {layout}, {title}", drawn)
 
 
 @page

@@ -1,4 +1,4 @@
-"""A figure of chapter 5: how many runs went wrong, and for which reason."""
+"""A figure of chapter 5: how many runs failed, and for which reason."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -53,7 +53,7 @@ def reasons(found: Evidence) -> Figure:
     axes[0].invert_yaxis()
     wrong = moved.mechanism[moved.mechanism != WELL].value_counts()
     listed = ", ".join(f"{count} {name}" for name, count in wrong.items())
-    title = f"{wrong.sum()} of {len(moved)} runs went wrong{': ' if listed else ''}{listed}"
+    title = f"{wrong.sum()} of {len(moved)} runs failed{': ' if listed else ''}{listed}"
     return marked(headed(figure, title), found.mark)
 
 

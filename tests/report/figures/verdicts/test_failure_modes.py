@@ -1,4 +1,4 @@
-"""Why runs went wrong: bars are counts."""
+"""Why runs fail: bars are counts."""
 
 from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.study import Experiment
@@ -23,7 +23,7 @@ def widths(axis) -> dict[tuple[int, int], float]:
 def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up, source_of):
     found = made_up(unlike)
     figure = failure_modes.reasons(found)
-    assert figure.get_suptitle() == "32 of 80 runs went wrong: 16 overshoot, 16 none of these"
+    assert figure.get_suptitle() == "32 of 80 runs failed: 16 overshoot, 16 none of these"
     signs, ends = (widths(axis) for axis in figure.axes)
     learners = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
     assert learners == ["ES", "DES", "RDES", "GES", "TDC"]
@@ -36,4 +36,4 @@ def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up,
 
 
 def test_a_study_in_which_all_went_well_says_so(made_up):
-    assert failure_modes.reasons(made_up()).get_suptitle() == "0 of 80 runs went wrong"
+    assert failure_modes.reasons(made_up()).get_suptitle() == "0 of 80 runs failed"
