@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.studies.difficulty import barn, clearance, measure, sight, spaced, stops_arriving
 from nmpcrl.study import paper
 
@@ -65,6 +66,10 @@ def test_the_first_gap_of_e_closes_before_that_of_d_as_their_rollouts_show():
     assert 0.15 < found["E"]["closes"] < 0.2 < found["D"]["closes"] < 0.25
     assert found["E"]["cost"] == pytest.approx(4369.70, abs=0.01)
     assert 0 < found["E"]["overshoot"] < 2
+    half = np.append(np.zeros(8), 0.005)  # of the step along which the slope is measured
+    raised, first = (evaluate(paper.nmpc("E"), paper.THETA_INIT + one, paper.STEPS).cost
+                     for one in (half, 0 * half))  # fmt: skip
+    assert found["E"]["slope"] == pytest.approx((raised - first) / 0.005, rel=0.2)
     assert np.isfinite([*found["D"].values()]).all()
     for horizon in (10, 20):
         grid = np.array([0.0, 0.15, 0.2, 0.5])
