@@ -121,8 +121,8 @@ MUTANTS = (  # a file, a part of one of its lines, and the mistake in its place
      "float(np.median(work / reference))"),
     ("bench/paired.py", "ppf((1 + CONFIDENCE) / 2", "ppf(CONFIDENCE"),
     ("bench/learners.py", "(share * solving).sum() / solves.sum()", "(share * solving).mean()"),
-    ("bench/summary.py", "solves[solves.warm & (", "solves[("),
-    ("bench/summary.py", "(2 * u * solve + self", "(u * solve + self"),
+    ("bench/solves.py", "solves[solves.warm].assign", "solves.assign"),
+    ("bench/saving.py", "(2 * u * solve + self", "(u * solve + self"),
 )  # fmt: skip
 TESTS = {  # of a file, where they are not in the file of its name
     "control/ocp.py": "control/test_ocp.py control/test_closed_form.py",

@@ -7,12 +7,14 @@ import mutants
 import pytest
 
 
-def test_the_line_of_every_mutant_is_in_the_library_once():
+def test_the_line_of_every_mutant_is_in_the_library_once_and_its_tests_are_there():
     times = {
         (one.file, one.old): (mutants.ROOT / "nmpcrl" / one.file).read_text("utf-8").count(one.old)
         for one in mutants.mutants()
     }
     assert {one: count for one, count in times.items() if count != 1} == {}
+    files = {name for one in mutants.mutants() for name in one.tests.split()}
+    assert [name for name in files if not (mutants.ROOT / "tests" / name).exists()] == []
 
 
 @pytest.mark.weekly

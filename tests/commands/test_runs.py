@@ -131,6 +131,16 @@ def test_runs_are_picked_by_name_and_sorted_by_a_column(command, stored, line, f
     assert [one.split()[0] for one in table] == [row["run"] for row in rows]
 
 
+def test_a_run_that_could_not_be_stored_is_reported_and_fails(command, monkeypatch):
+    from nmpcrl.study import run
+
+    monkeypatch.setattr("nmpcrl.study.fetch", lambda one, **_: run(one))
+    done = command("train", *WORDS)
+    assert done.exit_code == 1
+    assert "noise-free cost" in done.stdout
+    assert "Next" not in done.stdout
+
+
 def test_a_run_of_other_code_is_shown_and_that_is_said(command, stored):
     for line in ("runs", "show ES-A-step-seed1"):
         ended = command(*line.split())

@@ -1,6 +1,7 @@
 """The store: runs that are read, runs that are trained again, and refusals in one sentence."""
 
 import errno
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -173,6 +174,21 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_trained(
 
 
 @both_ways
+def test_a_disk_that_is_full_when_a_run_ends_is_one_sentence(runs, monkeypatch, ask):
+    fetch(LEARNING)
+
+    def full(file, **_):
+        file.write(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    with pytest.raises(StoreError, match=r"npz cannot be written \(No space left on device\)"):
+        ask(QUICK)
+    assert [*runs.glob("*.npz")] == [RUNS.path_of(LEARNING)]
+    assert [*runs.glob(".*.tmp")] == []
+
+
+@both_ways
 def test_a_run_that_may_not_be_read_is_not_taken_for_a_damaged_one(monkeypatch, no_run, ask):
     fetch(QUICK)
     content = RUNS.path_of(QUICK).read_bytes()
@@ -183,6 +199,30 @@ def test_a_run_that_may_not_be_read_is_not_taken_for_a_damaged_one(monkeypatch, 
         with pytest.raises(PermissionError):
             ask(QUICK)
     assert RUNS.path_of(QUICK).read_bytes() == content
+
+
+@both_ways
+def test_a_run_that_another_is_training_is_awaited_and_not_trained_twice(monkeypatch, ask):
+    trained, said = list[Experiment](), list[str]()
+    begun, waiting, go_on = (threading.Event() for _ in range(3))
+    monkeypatch.setattr(store, "say", lambda sentence: (said.append(sentence), waiting.set()))
+
+    def slowly(experiment, **_):
+        trained.append(experiment)
+        begun.set()
+        assert go_on.wait(60)
+        return run(experiment)
+
+    monkeypatch.setattr(store, "run", slowly)
+    with ThreadPoolExecutor(2) as threads:
+        first = threads.submit(fetch, QUICK)
+        assert begun.wait(60)
+        second = threads.submit(ask, QUICK)
+        waiting.wait(60)
+        assert "being trained by another process" in "".join(said)
+        go_on.set()
+        assert_same_numbers(first.result(), second.result())
+    assert trained == [QUICK]
 
 
 def test_runs_are_read_by_experiment_and_selected_by_field():
