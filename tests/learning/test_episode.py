@@ -160,8 +160,8 @@ def test_a_solve_that_fails_warm_is_begun_anew_by_both(failing, name):
 def test_where_every_start_fails_fatrop_takes_over_in_both(failing):
     nmpc = failing(all_fail=True)
     assert_same(MAKE["ES"], nmpc)
-    made = list(episodes(MAKE["ES"](nmpc), nmpc, weights(), noise()))
-    assert {episode.solver for episode in made} == {"fatrop"}
+    made = [step.plan for step in train(MAKE["ES"](nmpc), nmpc, weights(), noise())]
+    assert {plan.solver for plan in made if plan.took_over} == {"fatrop"}
 
 
 def test_where_no_solver_finds_an_optimum_the_episode_ends_in_both(failing, monkeypatch):

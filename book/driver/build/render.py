@@ -24,6 +24,9 @@ MOVED = {  # addresses of pages that are no more
     "book/letter": "departures.html#departures-questions",
     "book/learn_alone": "teach.html#teach-alone",
     "book/performance": "solver.html",
+    "book/for_reviewers": "evidence.html",
+    "book/reproducibility": "evidence.html",
+    "book/paper_and_book": "departures.html#departures-numbers",
 }
 ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">
