@@ -40,7 +40,7 @@ def write(executed: Iterable[Path], place: Path) -> None:
             source = Path(found.submodule_search_locations[0]) / folder / name
             (place / target / name).parent.mkdir(parents=True, exist_ok=True)
             (shutil.copytree if source.is_dir() else shutil.copyfile)(source, place / target / name)
-    exporter: Any = SlidesExporter(  # type: ignore[no-untyped-call]
+    exporter = SlidesExporter(
         config=Config(TemplateExporter={"extra_template_basedirs": [str(TEMPLATES)]}),
         template_name="deck",
         reveal_url_prefix="reveal",
