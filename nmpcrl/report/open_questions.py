@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from nmpcrl.report.text import departure_link, listed
+from nmpcrl.report.text import listed
 
 
 @dataclass(frozen=True)
@@ -43,47 +43,16 @@ QUESTIONS = (
 )
 
 
-def question_list(decides: Mapping[str, Collection[str]], varied: Collection[str]) -> str:
-    """The questions as a numbered list in Markdown, each with what depends on it here.
+def asked(decides: Mapping[str, Collection[str]]) -> str:
+    """The questions on which a verdict depends as a numbered list in Markdown, and which.
 
     Args:
         decides: claims whose verdicts depend on a departure, by its letter.
-        varied: the letters of the departures that were read in several ways.
     """
-    return "\n".join(
-        f"{number}. **{question.ask}** {_links(question)} {_decided(question, decides, varied)}"
-        for number, question in enumerate(QUESTIONS, start=1)
-    )
-
-
-def asked(decides: Mapping[str, Collection[str]]) -> str:
-    """The questions on which a verdict depends as a numbered list in Markdown, and which."""
-    return "\n".join(
-        f"{number}. {question.ask} (It bears on {listed(claims)}.)"
-        for number, (question, claims) in enumerate(_bearing(decides), start=1)
-    )
-
-
-def _bearing(decides: Mapping[str, Collection[str]]) -> list[tuple[Question, list[str]]]:
-    """The questions on which a verdict depends, each with its claims."""
-    found = [(question, _decides(question, decides)) for question in QUESTIONS]
-    return [(question, claims) for question, claims in found if claims]
-
-
-def _decides(question: Question, decides: Mapping[str, Collection[str]]) -> list[str]:
-    return sorted({claim for one in question.departures for claim in decides.get(one, ())})
-
-
-def _links(question: Question) -> str:
-    refs = " and ".join(departure_link(letter, letter) for letter in question.departures)
-    return f"(departure{'s' if len(question.departures) > 1 else ''} {refs})."
-
-
-def _decided(
-    question: Question, decides: Mapping[str, Collection[str]], varied: Collection[str]
-) -> str:
-    if claims := _decides(question, decides):
-        return f"The answer decides {listed(claims)} here."
-    if set(question.departures) & set(varied):
-        return "No verdict depends on it in what was run."
-    return "It was not varied here."
+    lines: list[str] = []
+    for question in QUESTIONS:
+        claims = sorted({claim for one in question.departures for claim in decides.get(one, ())})
+        if claims:
+            bears = f"(It bears on {listed(claims)}.)"
+            lines.append(f"{len(lines) + 1}. {question.ask} {bears}")
+    return "\n".join(lines)

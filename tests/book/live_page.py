@@ -15,7 +15,7 @@ CHAPTERS = {  # of each live figure
     "moving": "changing_world",
     "laboratory": "laboratory",
 }
-ALSO = ("07_beyond", "why_learning_stops")  # have the figure of runs, too
+ALSO = ("07_beyond",)  # has the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
 LATER = """count => new Promise(done => {

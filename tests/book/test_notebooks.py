@@ -39,13 +39,12 @@ GIVEN = [
     *OWN,
     "other_problems",
     "what_to_try_first",
-    "why_learning_stops",
     "changing_world",
 ]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
-MORE = ["other_problems", "what_to_try_first", "why_learning_stops"]
+MORE = ["other_problems", "what_to_try_first"]
 MORE += ["changing_world"]
 each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, *MORE])
 each_own = pytest.mark.parametrize("name", OWN)
@@ -388,7 +387,7 @@ def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(dr
         ("02_expected_sarsa", ["-p", "episode", "2"], "(did you mean 'episodes'?)"),
         ("02_expected_sarsa", ["-y", "{seeds: 3}"], "seeds = 3 must be a list, such as [3]"),
         ("04_ges", ["-p", "episodes", "90000"], "4,000,000 are allowed"),
-        ("06_what_the_paper_leaves_open", ["-p", "layouts", "A"], "must be a list, such as ['A']"),
+        ("05_results", ["-p", "layouts", "A"], "must be a list, such as ['A']"),
         ("07_beyond", ["-p", "budget", "1000000000"], "budget = 1000000000 must be a whole"),
         ("01_mdp_and_nmpc", ["-p", "horizon", "21"], "must be 20 or less here: a longer plan"),
         ("solver", ["-p", "horizon", "1000000000000"], "from 1 to 500"),

@@ -146,7 +146,7 @@ def test_no_two_numbers_of_one_quantity_differ(html):
     [
         ("03_rdes", "early: the published main table"),
         ("03_rdes", of_steps("RDES", "ipopt")),
-        ("06_what_the_paper_leaves_open", "alone: rollouts of this page"),
+        ("06_why_learning_stops", "alone: rollouts of this page"),
         ("07_beyond", "at margin: the published searches"),
         ("07_beyond", "by hand: rollouts of this page"),
         ("intro", "layouts solved by hand: rollouts of this build"),

@@ -21,6 +21,8 @@ MOVED = {  # addresses of pages that are no more
         "api_study.html#api-rest",
     ),
     "book/cluster": "reproduce.html#reproduce-cluster",
+    "book/06_what_the_paper_leaves_open": "06_why_learning_stops.html",
+    "book/why_learning_stops": "06_why_learning_stops.html",
     "book/letter": "departures.html#departures-questions",
     "book/learn_alone": "teach.html#teach-alone",
     "book/performance": "solver.html",

@@ -1,4 +1,4 @@
-"""The exercises of the chapter on why learning stops."""
+"""The exercises of Chapter 6."""
 
 from itertools import cycle, product
 from typing import Any
@@ -7,7 +7,57 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.course import Outcome, choice, function, number
+from nmpcrl.course.checks.precision import to_places
 from nmpcrl.studies.population import STANDING, STOOD
+
+
+def gap(answer: Any) -> Outcome:
+    """The theta_c at which the circles around two centres touch."""
+    apart = 2.8
+    closes = (apart / 2.5) ** 2 - 1
+    return number(
+        answer,
+        closes,
+        tolerance=to_places(closes, 2, least=0.02),
+        mistakes={
+            (apart / 1.25) ** 2 - 1: f"Each of the two takes its part of the {apart} m.",
+            apart / 2.5 - 1: "The square is missing: theta_c stands below a root.",
+            (apart / 2.5) ** 2: "That is 1 + theta_c.",
+        },
+    )
+
+
+def screen(answer: Any) -> Outcome:
+    """A criterion that asks the question of the claim."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "That is geometry, known before anything is trained.",
+            "b": "That restricts the claim to layouts with something to gain, and uses the first "
+            "rollout only.",
+            "c": "it asks the learners the very question of the claim, and keeps the layouts in "
+            "which one of them said yes.",
+            "d": "That is about solvers at one state; no learner is asked.",
+        },
+    )
+
+
+def smallest(answer: Any) -> Outcome:
+    """That at least one of many cells has a small p."""
+    cells = 120
+    small = 0.01
+    some = 1 - (1 - small) ** cells
+    return number(
+        answer,
+        some,
+        tolerance=to_places(some, 2, least=0.01),
+        mistakes={
+            cells * small: "That is how many are to be expected; a probability is at most 1.",
+            (1 - small) ** cells: "That is the probability that none has.",
+            small: "That is the probability for one cell.",
+        },
+    )
 
 
 def standing(answer: Any) -> Outcome:
@@ -22,20 +72,6 @@ def standing(answer: Any) -> Outcome:
             cost: "V does not cancel: the next value is discounted, so delta = l + gamma V - V.",
             cost / (1 - gamma): "That is what standing for ever costs, not the TD error.",
             (1 - gamma) * value - cost: "The TD error is what is paid and promised, minus V.",
-        },
-    )
-
-
-def evidence(answer: Any) -> Outcome:
-    """Which record shows the trap."""
-    return choice(
-        answer,
-        "c",
-        {
-            "a": "In the trap V comes closer to what is paid, so the TD error may fall.",
-            "b": "The training cost falls with the noise, whatever becomes of the policy.",
-            "c": "the trap is a robot that stands and a TD error above 0 there.",
-            "d": "No step in the trap needs to be long.",
         },
     )
 
@@ -120,6 +156,6 @@ def feedback(answer: Any) -> Outcome:
 
 
 def fed_back(predict: Any, theta: Vector, phi: Vector, gamma: float, probe: float = 1e-5) -> float:
-    """Eq. (10.3), by central differences along phi."""
+    """Eq. (6.3), by central differences along phi."""
     ahead, behind = predict(theta + probe * phi), predict(theta - probe * phi)
     return float(gamma * (ahead - behind) / (2 * probe * (phi @ phi)))

@@ -102,11 +102,12 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
 
 
 @page
-def interventions(watched: Mapping[str, Mapping[str, Outcome]]) -> Figure:
+def interventions(watched: Mapping[str, Mapping[str, Outcome]], finding: str) -> Figure:
     """Largest alpha ||phi||^2 and median feedback of each episode, a column a run.
 
     Args:
         watched: by the name of a run, and then by intervention.
+        finding: the title.
     """
     options: dict[str, Any] = {"sharex": "col", "sharey": "row", "squeeze": False, "across": 1}
     figure, axes = subplots(2, len(watched), 4.4, **options)
@@ -127,17 +128,7 @@ def interventions(watched: Mapping[str, Mapping[str, Outcome]]) -> Figure:
     axes[1, 0].set_ylabel("feedback [-]")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    return headed(figure, _stopped(watched))
-
-
-def _stopped(watched: Mapping[str, Mapping[str, Outcome]]) -> str:
-    """How many runs had to be stopped, by intervention, in a title."""
-    counts = {how: sum(of[how].stopped for of in watched.values()) for how in WATCHED}
-    every = len(watched)
-    return (
-        f"Of {every} runs of RDES {counts['none']} were stopped; with the slope of the NMPC"
-        f" {counts['true slope']}, with θ held {counts['theta held']}"
-    )
+    return headed(figure, finding)
 
 
 def _fall(lowest: float) -> str:

@@ -26,8 +26,8 @@ from nmpcrl.report.figures.style import (
 )
 from nmpcrl.studies.population import STANDING
 
-PANELS = tuple(("map", name) for name in ("value", "delta", "theta_c", "cost"))
-ROWS, HEIGHT = (1.4, 1, 1, 1), 5.6
+PANELS = (("map", "map"), ("value", "delta"), ("theta_c", "cost"))
+ROWS, HEIGHT = (2.2, 1, 1), 6.2
 MOMENTS = (("#0072B2", "-"), ("#B37A00", "--"), (WINE, "-."))  # of a trajectory and its clearances
 BEST: dict[str, Any] = {"color": TEAL, "linestyle": "-"}
 FIRST: dict[str, Any] = {"color": WINE, "linestyle": "--"}
@@ -42,21 +42,22 @@ LINES: dict[str, dict[str, Any]] = {
     "cost": {"cost": {"color": INK}},
 }
 LABELS = {
-    "value": "where it\nends [cost]",
-    "delta": "|δ| [cost]",
-    "theta_c": r"$\theta_c$ [-]",
-    "cost": "noise-free\ncost [-]",
+    "value": "where it ends",
+    "delta": "|δ|",
+    "theta_c": r"$\theta_c$",
+    "cost": "cost without noise",
 }
 
 
 @page
-def trap(task: Task, stands: Sequence[Stand], moments: Sequence[int]) -> Figure:
+def trap(task: Task, stands: Sequence[Stand], moments: Sequence[int], finding: str) -> Figure:
     """One run: where the robot goes at three moments, and what value, TD error and cost do.
 
     Args:
         task: what the robot moves in.
         stands: of `analysis.trap.stands`.
         moments: which three of them the map shows, the last two of a robot that stands.
+        finding: the title.
     """
     figure, panels = mosaic(PANELS, ROWS, HEIGHT)
     _map(panels["map"], task, [stands[k] for k in moments])
@@ -72,13 +73,11 @@ def trap(task: Task, stands: Sequence[Stand], moments: Sequence[int]) -> Figure:
             axes.plot(along, np.where(away | (name != "value"), values, np.nan), **look)
         axes.set(xlim=(0, along[-1]), ylabel=LABELS[name])
         axes.set_ylim(bottom=0)
-        axes.tick_params(labelbottom=name == "cost")
+        over_episodes(axes, "episode" if name in PANELS[-1] else "")
     panels["value"].set_ylim(top=1.5 * panels["value"].get_ylim()[1])
     panels["value"].legend(ncols=2, fontsize="small", loc="upper right")
     panels["value"].set_title("grey: the robot stands", **SUBTITLE)
-    over_episodes(panels["cost"])
-    figure.align_ylabels([*panels.values()][1:])
-    return headed(figure, _finding(there))
+    return headed(figure, finding)
 
 
 @page
@@ -86,7 +85,7 @@ def cliffs(
     grid: Vector,
     costs: Mapping[str, tuple[Vector, Vector]],
     best: Mapping[str, float],
-    raised: float,
+    finding: str,
 ) -> Figure:
     """Cost over theta_c with all else best, and with all else as it was, a panel a layout.
 
@@ -94,7 +93,7 @@ def cliffs(
         grid: of theta_c.
         costs: on the grid, by layout: with the best theta, and with theta_init.
         best: theta_c of the best theta, by layout.
-        raised: the largest share of the best cost that 2 % more of it adds.
+        finding: the title.
     """
     columns = min(MAPS, len(costs))
     rows = -(-len(costs) // columns)
@@ -111,8 +110,7 @@ def cliffs(
         panel.set_ylabel("cost [thousands]")
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
-    title = rf"2 % more than the best $\theta_c$ adds {raised:.1%} of the cost"
-    return headed(figure, f"{title} at most")
+    return headed(figure, finding)
 
 
 def _map(axes: Axes, task: Task, shown: Sequence[Stand]) -> None:
@@ -126,18 +124,5 @@ def _map(axes: Axes, task: Task, shown: Sequence[Stand]) -> None:
         axes.plot(*one.states[:, :2].T, color=color, linestyle=style, linewidth=2, label=label)
         if not one.arrived:
             axes.plot(*one.states[-1, :2], "X", color=color, markersize=8, mec="white")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize="small")
+    axes.legend(loc="lower left", fontsize="small")
     axes.set(xlabel="x [m]", ylabel="y [m]")
-
-
-def _finding(there: Sequence[Stand]) -> str:
-    if not there:
-        return "The robot never stands before a closed gap"
-    first, last = there[0], there[-1]
-    below = sum(one.value < one.forever for one in there)
-    always = "" if below == len(there) else f" at {below} of {len(there)} times"
-    return (
-        rf"While the robot stands, V is below $\ell / (1 - \gamma)${always}: $\theta_c$ goes from"
-        f" {first.theta_c:.2f} to {last.theta_c:.2f}, and the cost from {first.cost:.0f} to"
-        f" {last.cost:.0f}"
-    )

@@ -1,48 +1,37 @@
-"""Figures of the layouts, theta_c among them, and where the borders of the claims lie.
+"""Figures of the layouts, and where the borders of the claims lie.
 
 The map of the verdicts is in `figures.robustness`.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from nmpcrl import Matrix, Vector
-from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.analysis.trajectory import closes_at
+from nmpcrl import Matrix
 from nmpcrl.claims.by_runs import Values
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
-from nmpcrl.report.figures.axes import below, draw_task, map_grid, over_episodes, plain
+from nmpcrl.report.figures.axes import draw_task, map_grid, plain
 from nmpcrl.report.figures.style import (
     AT_ONE,
     LIMIT,
-    LOOKS,
     SUBTITLE,
     TEAL,
     WINE,
     headed,
     marked,
     page,
-    subplots,
 )
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import gaps
 
 OPEN, CLOSED = TEAL, WINE  # a gap
-LEARNING = ("ES", "RDES", "GES", "TDC")  # whose theta_c is drawn; that of DES may go anywhere
-NEAR = 0.05  # of theta_c from d_o
 NARROW = 1.0  # a gap that is drawn leaves less than this [m]
-SEEN = (-0.1, 0.6)  # of theta_c; what goes beyond ends at the edge
 FEW = 100  # high over low of borders for which powers of ten are too few
-DASHED = LIMIT | {"linestyle": (0, (7, 3))}  # told from dotted lines without colour
 
 
 @page
@@ -72,40 +61,6 @@ def layouts(rollouts: Mapping[str, Matrix]) -> Figure:
     count = f"{closing} of {len(rollouts)} layouts"
     finding = rf"In {count}, a gap of the first rollout is closed at $\theta_c$ = {margin:g}"
     return headed(figure, finding)
-
-
-@page
-def theta_c(found: Evidence) -> Figure:
-    """theta_c over training, a column a layout and a row a reading of the decay."""
-    names, decays = (found.summaries.values_of(field) for field in ("layout", "decay"))
-    options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "across": 3}
-    figure, grid = subplots(len(decays), len(names), 1.9 * len(decays) + 0.9, **options)
-    margin = paper.task().margin
-    ends: list[float] = []
-    for row, decay in zip(grid, decays, strict=True):
-        for axes, name in zip(row, names, strict=True):
-            runs = found.summaries.select(layout=name, decay=decay)
-            ends += _ways_of_theta_c(axes, runs)
-            axes.axhline(margin, **DASHED)
-            for run in list(runs.select(learner="frozen").values())[:1]:
-                shut = closes_at(paper.task(name), run.states[:, :2])
-                axes.axhline(shut, color=CLOSED, linewidth=0.9, linestyle=":")
-        row[0].set(ylabel=rf"$\theta_c$, per {decay}", ylim=SEEN)
-    for axes, name in zip(grid[0], names, strict=True):
-        axes.set_title(name, fontsize="medium")
-    for axes in grid[-1]:
-        over_episodes(axes)
-    handles = [Line2D([], [], label=name, **LOOKS[name].line) for name in LEARNING]
-    handles.append(Line2D([], [], label="$d_o$", **DASHED))
-    handles.append(Line2D([], [], label="a gap closes", color=CLOSED, linestyle=":"))
-    below(figure, handles)
-    beyond = np.array(ends) - margin
-    near, past = int((np.abs(beyond) <= NEAR).sum()), int((beyond > NEAR).sum())
-    finding = (
-        rf"Of {len(ends)} runs, {near} end with $\theta_c$ within {NEAR:g} of $d_o$ = {margin:g},"
-        f" and {past} far above it"
-    )
-    return marked(headed(figure, finding), found.mark)
 
 
 @page
@@ -157,18 +112,6 @@ def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:
     first = max(other[other < own], default=-1) + 1
     last = min(other[other > own], default=len(curve)) - 1
     return float(curve.border.iloc[first]), float(curve.border.iloc[last])
-
-
-def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, RunSummary]) -> list[float]:
-    """Draw theta_c of every run that is shown; return where each ends."""
-    ends = []
-    for run in runs.values():
-        if run.name.learner in LEARNING:
-            values: Vector = run.evaluations["theta"][:, -1]
-            line = LOOKS[run.name.learner].line
-            axes.plot(run.evaluations["episode"], values, **line, linewidth=0.7)
-            ends.append(float(values[-1]))
-    return ends
 
 
 def _gap(axes: Axes, task: Task, sides: tuple[int, int], *, shut: bool) -> None:

@@ -1,4 +1,4 @@
-"""The drawn layouts: in which share a claim holds, and what tells beforehand where ES works."""
+"""Random layouts: in which share a claim holds, and what tells beforehand where ES works."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -26,7 +26,7 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
-from nmpcrl.studies.difficulty import MEASURES, OPEN, PILOT
+from nmpcrl.studies.difficulty import OPEN, PILOT
 from nmpcrl.studies.population import EXPECTED
 
 LOOK: Mapping[Outcome, tuple[str, str]] = {  # colour and mark of an outcome
@@ -53,13 +53,13 @@ ENDS = ((True, TEAL, "o", 3, "ES improves"), (False, WINE, "X", 4, "it does not"
 
 
 @page
-def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcome]) -> Figure:
+def shares(found: pd.DataFrame, six: pd.DataFrame, finding: str) -> Figure:
     """One row a claim: in which share of the layouts it holds, beside A to F and what was expected.
 
     Args:
         found: of `population.shares`, of the drawn layouts.
         six: the same of A to F.
-        verdicts: the outcomes of A to F by claim, for the title.
+        finding: the title.
     """
     height = ROW * len(found) + 1.3
     figure, axes = subplots(height=height + 0.3)
@@ -82,21 +82,18 @@ def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcom
     ]
     handles += [Line2D([], [], label="A to F", **NAMED), Rectangle((0, 0), 1, 1, **BAND)]
     below(figure, handles, [*(one.get_label() for one in handles[:-1]), "expected"])
-    here = found.set_index("claim").outcome
-    judged = [name for name in here.index if name in verdicts]
-    stand = sum(here[name] == verdicts[name] for name in judged)
-    drawn = f"over {found.layouts.max()} drawn layouts"
-    return headed(figure, f"{stand} of {len(judged)} verdicts on A to F stand {drawn}")
+    return headed(figure, finding)
 
 
 @page
-def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series) -> Figure:
+def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series, finding: str) -> Figure:
     """Where ES ends against where a gap closes, and how well each measure tells that beforehand.
 
     Args:
         scores: of `predictors.predictor_scores`.
         runs: of ES, of `rows.table`.
         closes: theta_c at which the first gap of the first trajectory closes, a run's layout each.
+        finding: the title.
     """
     figure, (ends, areas) = subplots(1, 2, across=1, tall=ROW * len(scores) + 3.9)
     _ends(ends, runs, closes)
@@ -110,9 +107,6 @@ def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series) -> F
     areas.set_yticks(range(len(order)), [LABELS[name] for name in order], fontsize="small")
     areas.set(ylim=(len(order) - 0.4, -0.6), xlabel="area under the ROC curve")
     areas.set_title("how well it tells beforehand", **SUBTITLE)
-    rank = order.index(PILOT) + 1
-    place = "best" if rank == 1 else f"{rank}th of {len(MEASURES)}"
-    finding = f"Where a gap closes tells {place} where ES works: {scores.auc[PILOT].value:.2f}"
     return headed(figure, finding)
 
 

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.robustness import WHOLE
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.figures.sheet import in_words
 from nmpcrl.report.figures.style import headed, marked, page, subplots
@@ -31,14 +30,14 @@ SMALL: dict[str, Any] = {"va": "center", "fontsize": "small"}
 
 
 @page
-def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
+def verdict_map(judged: pd.DataFrame, finding: str, mark: str) -> Figure:
     """What becomes of each claim in each row, framed where it is not what it is compared with.
 
     Args:
         judged: of `robustness_map`.
+        finding: the title.
         mark: where the runs come from.
     """
-    finding = _changed(judged)
     claims, rows = list(judged.claim.unique()), list(judged.variant.unique())
     letters = dict(zip(judged.variant, judged.departure, strict=True))
     height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
@@ -97,16 +96,3 @@ def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
     elif 0 < cell["share"] < 1:
         text += f" {cell['share']:.0%}"
     axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize="small")
-
-
-def _changed(judged: pd.DataFrame) -> str:
-    """How many verdicts change, of which claim most do, and of which none does."""
-    decided = judged[(judged.variant != WHOLE) & (judged.outcome != UNDECIDABLE)]
-    decided = decided[decided.base != UNDECIDABLE]
-    changes = decided.groupby("claim", sort=False).changes.sum()
-    never = [str(claim) for claim, count in changes.items() if not count]
-    steady = f"; those on {' and '.join(never)} never" if never and changes.any() else ""
-    count = f"{int(changes.sum())} of {len(decided)} decided verdicts change"
-    if not changes.any():
-        return count
-    return f"{count}, {changes.max()} of them on {changes.idxmax()}{steady}"
