@@ -1,14 +1,16 @@
 """What may help where learning fails: other rules, and what is put around any learner.
 
-| remedy    | theta moves by                                                             |
-|-----------|----------------------------------------------------------------------------|
-| TDRC      | gradient TD with one step size, whose w decays                             |
-| GES-3     | gradient TD, beta = 3 alpha, and steps of w that cannot overshoot          |
-| guarded   | what a learner would, with alpha at most 1 / ||phi||^2                     |
-| directed  | the direction of ES, as far as a learner would                             |
-| scheduled | what a learner would, by a part that changes with the steps                |
-| averaged  | what a learner would; what is judged is the mean theta                     |
-| undone    | what a learner would, and back where a rollout without noise costs more    |
+=========  =======================================================================
+remedy     theta moves by
+=========  =======================================================================
+TDRC       gradient TD with one step size, whose w decays
+GES-3      gradient TD, beta = 3 alpha, and steps of w that cannot overshoot
+guarded    what a learner would, with alpha at most 1 / ||phi||^2
+directed   the direction of ES, as far as a learner would
+scheduled  what a learner would, by a part that changes with the steps
+averaged   what a learner would; what is judged is the mean theta
+undone     what a learner would, and back where a rollout without noise costs more
+=========  =======================================================================
 
 Gauss-Newton steps are in `gauss_newton`, the deterministic policy gradient in `policy_gradient`.
 """

@@ -6,7 +6,7 @@ import pytest
 from driver import project
 from visits import EACH_PUSH, TELEPHONES, VIEWS, look_at, opened
 
-PAGES = [*project.pages(), "search", "genindex", "prf-prf"]  # the last three are Sphinx's
+PAGES = [*project.pages(), "search", "genindex"]  # the last two are Sphinx's
 each_page = pytest.mark.parametrize("page", PAGES)
 
 

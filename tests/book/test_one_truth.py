@@ -170,7 +170,7 @@ def test_every_ratio_of_times_is_the_published_one(html):
         for learner, shown, solver in TIME.findall(text):
             expected = ratio(found.timings, SOLVER.get(solver or None, solver), learner).value
             assert shown == f"{expected:.2f}", f"{page}: {learner} {shown} with {solver}"
-    assert TIME.search(" ".join(html("book/05_results.html").find("article").get_text(" ").split()))
+    assert TIME.search(" ".join(html("book/evidence.html").find("article").get_text(" ").split()))
 
 
 @pytest.mark.parametrize(

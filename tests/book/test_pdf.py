@@ -1,5 +1,7 @@
 """The book on paper: one page of all pages, printed by Chromium."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pdf
 import pytest
 from bs4 import BeautifulSoup
@@ -42,7 +44,8 @@ def test_what_is_folded_is_open_and_what_is_for_a_screen_is_gone(site):
 @pytest.mark.browser
 def test_it_is_printed_and_leaves_no_page_behind(site, monkeypatch):
     monkeypatch.setattr(pdf, "READY", "() => {}")
-    result = CliRunner().invoke(pdf.main, [str(site)])
+    with ThreadPoolExecutor(1) as apart:  # from the browser of the session's other tests
+        result = apart.submit(CliRunner().invoke, pdf.main, [str(site)]).result()
     assert result.exit_code == 0, result.output
     assert (site / "nmpcrl.pdf").read_bytes().startswith(b"%PDF")
     assert not (site / "book/whole.html").exists()

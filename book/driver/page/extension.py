@@ -2,6 +2,7 @@
 
 import re
 import sys
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -11,7 +12,10 @@ from sphinx.application import Sphinx
 from driver.project import ROOT
 
 FLOATS = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
+OBJECT = re.compile(r"<(?:[^<>]|<[^<>]*>)*>")  # `<factory>` or `<function ...>`
 TABLE = re.compile(r"<table\b.*?</table>", flags=re.S)
+PARAMETERS = re.compile(r'<dt class="sig\b.*?</dt>', flags=re.S)
+SIDEBAR = '<div id="pst-primary-sidebar"'
 SHORT = "ndarray[tuple[Any, ...], dtype[float64]]"
 
 
@@ -22,6 +26,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("doctree-resolved", with_aliases_of_fields)
     app.connect("doctree-read", with_tags)
     app.connect("html-page-context", accessible)
+    app.connect("build-finished", with_landmarks)
     app.connect("autodoc-process-docstring", without_macros, priority=400)  # before napoleon's
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -29,8 +34,9 @@ def setup(app: Sphinx) -> dict[str, bool]:
 def with_aliases(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, given: str | None, returned: str
 ) -> tuple[str | None, str]:
-    """A signature with `Array` in the place of what Python makes of `Vector` and `Matrix`."""
-    return given and given.replace(FLOATS, "Array"), returned and returned.replace(FLOATS, "Array")
+    """A signature with `Array` for `Vector` and `Matrix`, and `...` for a default of no literal."""
+    given = given and OBJECT.sub("...", given.replace(FLOATS, "Array"))
+    return given, returned and returned.replace(FLOATS, "Array")
 
 
 def with_aliases_of_fields(app: Sphinx, doctree: nodes.document, page: str) -> None:
@@ -56,8 +62,16 @@ def with_tags(app: Sphinx, doctree: nodes.document) -> None:
 
 
 def accessible(app: Sphinx, page: str, template: str, context: dict[str, Any], _: Any) -> None:
-    """Give headers of tables a scope, and each table a place in which it scrolls."""
-    context["body"] = TABLE.sub(_scrolling, context.get("body", ""))
+    """Give headers of tables a scope, each table a place in which it scrolls, and lists terms."""
+    body = TABLE.sub(_scrolling, context.get("body", ""))
+    context["body"] = PARAMETERS.sub(_without_a_list, body)
+
+
+def with_landmarks(app: Sphinx, exception: Exception | None) -> None:
+    """Make the side bar of every written page a landmark."""
+    for path in Path(app.outdir).rglob("*.html"):
+        named = f'{SIDEBAR} role="navigation" aria-label="Book"'
+        path.write_text(path.read_text("utf-8").replace(SIDEBAR, named), "utf-8")
 
 
 def _scrolling(table: re.Match[str]) -> str:
@@ -66,6 +80,12 @@ def _scrolling(table: re.Match[str]) -> str:
     return f'<div class="scrolls" tabindex="0">{scoped}</div>'
 
 
+def _without_a_list(signature: re.Match[str]) -> str:
+    """A signature whose parameters are lines; Sphinx makes them a list without terms."""
+    lines = signature[0].replace("<dl>", '<div class="parameters">').replace("</dl>", "</div>")
+    return lines.replace("<dd>", '<div class="parameter">').replace("</dd>", "</div>")
+
+
 def _scoped(part: str, scope: str) -> str:
-    part = re.sub(r"<th\b[^>]*>\s*</th>", "<td></td>", part)  # a header of nothing
+    part = re.sub(r"<th\b[^>]*>\s*(<p>\s*</p>)?\s*</th>", "<td></td>", part)  # a header of nothing
     return re.sub(r"<th(?=[ >])(?![^>]*\bscope=)", f'<th scope="{scope}"', part)

@@ -51,7 +51,7 @@ def run_page(records: Records, frozen: Records | None = None) -> Figure:
 
     Args:
         records: the run.
-        frozen: its frozen arm, drawn beside its costs.
+        frozen: the baseline without learning, drawn beside its costs.
     """
     figure, panels = mosaic(PANELS, ROWS, HEIGHT)
     _map(panels["map"], records)
@@ -114,7 +114,8 @@ def _theta(axes: Axes, records: Records) -> None:
     axes.set_ylabel("component of θ [-]")
     _by_episode(axes, records)
     if change.max() > WIDE:
-        axes.set_yscale("symlog", linthresh=1, linscale=3)
+        decades = np.log10(np.nanmax(np.abs(values)))
+        axes.set_yscale("symlog", linthresh=1, linscale=max(3, decades / 2))
         axes.yaxis.get_major_locator().set_params(numticks=7)  # type: ignore[call-arg]
     if named:
         axes.margins(y=ABOVE)
@@ -168,22 +169,22 @@ def _costs(noisy: Axes, free: Axes, records: Records, frozen: Records | None) ->
 
 
 def _against(records: Records, frozen: Records | None) -> str:
-    """The training cost at the end, beside that of the frozen arm."""
+    """The training cost at the end, as a multiple of the baseline's."""
     if frozen is None:
         return "Training, exploration included"
     ratio = metrics.cost_ratio(metrics.training_cost(records), metrics.training_cost(frozen))
     if not np.isfinite(ratio):
         return "Training, cut short"
-    return f"Training ends at {ratio:.2f} times the frozen arm"
+    return f"Training: {ratio:.2f} of the baseline"
 
 
 def _source(records: Records, frozen: Records | None) -> str:
-    """Which run it is, and whether its frozen arm is drawn."""
+    """Which run it is, and whether its baseline is drawn."""
     e = records.experiment
     without = frozen is None and e["learner"] != "frozen"
     return (
         f"{e['learner']}, layout {e['layout']}, {DECAY_TITLES[e['decay']]}, seed {e['seed']},"
-        f" {_episodes(e['episodes'])}" + ("; the frozen arm is not stored" if without else "")
+        f" {_episodes(e['episodes'])}" + ("; its baseline is not stored" if without else "")
     )
 
 

@@ -87,12 +87,12 @@ def test_steps_above_2_are_counted_in_the_title(known):
 
 def test_the_frozen_arm_is_drawn_beside_the_costs_only_if_it_is_there(known):
     without, with_arm = run_page(known["ES"]), run_page(known["ES"], known["frozen"])
-    assert "the frozen arm is not stored" in without.get_supxlabel()
-    assert "the frozen arm is not stored" not in with_arm.get_supxlabel()
-    assert "the frozen arm is not stored" not in run_page(known["frozen"]).get_supxlabel()
+    assert "its baseline is not stored" in without.get_supxlabel()
+    assert "its baseline is not stored" not in with_arm.get_supxlabel()
+    assert "its baseline is not stored" not in run_page(known["frozen"]).get_supxlabel()
     lines = [len(figure.axes[3].get_lines()) for figure in (without, with_arm)]
     assert lines == [1, 2]
-    assert any("times the frozen arm" in title for title in titles(with_arm))
+    assert any("of the baseline" in title for title in titles(with_arm))
 
 
 def test_the_title_has_the_numbers(known):
