@@ -10,7 +10,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf course smoke chapter lab study bench test test-slow test-site test-weekly test-lab test-course check clean
+.PHONY: help book pdf course smoke chapter lab study bench test test-site test-tenth test-lab test-all check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -45,29 +45,25 @@ study: .venv/ready  ## Train the whole study, or what is missing of it: hours, a
 bench: .venv/ready  ## Measure how long learning steps and solves take
 	@$(BIN)/python -m nmpcrl bench
 
-# On all cores, up to four. A target that names files does so to read no others: tests/conftest.py
-# lets no test with its marker stand elsewhere.
-PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
-DEMANDING := slow or browser or network
-ELSEWHERE := built or lab or course or weekly
+# On all cores, up to four. `ONLY=04_ges` runs the tests with this in their name.
+PYTEST = $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal $(if $(ONLY),-k "$(ONLY)")
+FAST := not (slow or weekly or browser or network or built or lab)
+TENTH ?= today
 
-test: .venv/ready  ## What takes little of the tests of the library, its commands and the book's sources
-	@$(PYTEST) -m "not ($(DEMANDING)) and not ($(ELSEWHERE))"
-
-test-slow: .venv/ready  ## The others of them: they train, compile, or need a browser or the network
-	@$(PYTEST) -m "($(DEMANDING)) and not ($(ELSEWHERE))"
+test: .venv/ready  ## Fast tests of the library, its commands and the book's sources
+	@$(PYTEST) -m "$(FAST)"
 
 test-site: .venv/ready  ## The built book in a browser; needs a built book and a Chromium
-	@$(PYTEST) -m "built and not lab and not course and not weekly" tests/book
+	@$(PYTEST) -m "built and not (weekly or lab)" tests/book
 
-test-weekly: .venv/ready  ## What no push waits for: Firefox, all themes, many problems; needs a built book, too
-	@$(PYTEST) -m "weekly and not lab and not course"
+test-tenth: .venv/ready  ## A tenth of the slow tests, another each day, or the one that TENTH=3 names
+	@$(PYTEST) -m "not (built or lab) and not ($(FAST))" --tenth $(TENTH)
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab $(if $(ONLY),-k "$(ONLY)") tests/book/test_lab.py
 
-test-course: .venv/ready  ## Grade every notebook of the course, empty and solved, and compare the editions with nbgrader
-	@$(PYTEST) -m course $(if $(ONLY),-k "$(ONLY)") tests/book/test_course.py
+test-all: .venv/ready test-lab  ## All tests: an hour or two; needs a built book, a Chromium and a Firefox
+	@$(PYTEST) -m "not lab"
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks without executing any
 	@$(BIN)/ruff check .

@@ -1,7 +1,6 @@
 """Where things are, a browser for the tests of the built site, and times that nobody measured."""
 
 import os
-import re
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -12,6 +11,7 @@ import numba
 import numpy as np
 import pandas as pd
 import pytest
+import tenths
 from builders import evidence_of
 from hypothesis import settings
 
@@ -31,12 +31,6 @@ NEEDS = {  # fixture -> the markers of a test that asks for it, directly or thro
     "distributed_firefox": "browser weekly",
     "jupyter_lab": "lab",
 }
-PLACES = {  # marker -> where `make` looks for the tests that have it
-    marker: places.split()
-    for marker, places in re.findall(
-        r'-m "?(built|lab|course)\b.*?((?: tests/\S+)+)$', (ROOT / "Makefile").read_text(), re.M
-    )
-}
 RUNS = Path(os.environ.get("NMPCRL_RUNS") or ROOT / "runs")  # before a test names others
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
@@ -45,15 +39,36 @@ FLAGS = (
 )
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--tenth 3`, or `--tenth today`: of the tests that are asked for, those of one tenth."""
+    parser.addoption("--tenth", help="run one tenth of the tests: 0 to 9, or today")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Settle which tenth is meant before workers start, and midnight comes."""
+    if config.option.tenth is not None:
+        config.option.tenth = str(tenths.asked(config.option.tenth))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave the tests of other tenths out."""
+    if config.option.tenth is not None:
+        chosen, _ = map(set, tenths.split((one.nodeid for one in items), int(config.option.tenth)))
+        config.hook.pytest_deselected(items=[one for one in items if one.nodeid not in chosen])
+        items[:] = [one for one in items if one.nodeid in chosen]
+
+
+def pytest_report_header(config: pytest.Config) -> str | None:
+    """Which tenth it is, so that it can be run again."""
+    return None if config.option.tenth is None else f"--tenth {config.option.tenth}"
+
+
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Mark a test with what it needs, so that none can forget to say so, and see that it is run."""
+    """Mark a test with what it needs, so that none can forget to say so."""
     for fixture in NEEDS.keys() & set(getattr(item, "fixturenames", ())):
         for marker in NEEDS[fixture].split():
             item.add_marker(marker)
-    for marker, places in PLACES.items():
-        there = any(item.path.is_relative_to(ROOT / place) for place in places)
-        if not there and item.get_closest_marker(marker):
-            raise pytest.UsageError(f"{item.nodeid} is {marker!r}: it belongs in {places}")
 
 
 def missing(reason: str) -> None:

@@ -86,7 +86,7 @@ def test_a_deck_shows_its_slides_without_a_network(executed, tmp_path, browser):
     page.close()
 
 
-@pytest.mark.course
+@pytest.mark.slow
 @each_chapter
 def test_a_solved_chapter_has_all_points_and_an_empty_one_has_none(name, tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
@@ -118,7 +118,7 @@ def of_nbgrader(commands: Path, place: Path, *words: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.course
+@pytest.mark.slow
 @pytest.mark.network
 def test_nbgrader_makes_the_same_notebooks_for_students(nbgrader, tmp_path):
     course.write(tmp_path)
@@ -130,7 +130,7 @@ def test_nbgrader_makes_the_same_notebooks_for_students(nbgrader, tmp_path):
         assert [c.source.rstrip() for c in made.cells] == [c.source.rstrip() for c in ours.cells]
 
 
-@pytest.mark.course
+@pytest.mark.slow
 @pytest.mark.network
 def test_nbgrader_gives_the_same_points(nbgrader, tmp_path):
     source = tmp_path / "source/small/small.ipynb"
