@@ -94,11 +94,6 @@ def test_what_cannot_be_solved_is_marked_and_leaves_the_others_alone():
     assert (beyond.status == "refused").all()
 
 
-def test_an_empty_batch_is_a_batch(nmpc):
-    batch = nmpc.solve_many(np.empty((0, 2)), nmpc.problem.theta)
-    assert batch.inputs.shape == (0, 6, 1)
-
-
 def test_a_shape_is_refused_with_the_one_to_give(nmpc):
     states, thetas, actions, _ = drawn(nmpc, 3)
     for given, said in (

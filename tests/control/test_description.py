@@ -161,16 +161,6 @@ def test_an_array_of_a_plant_or_a_task_cannot_be_changed(k, name):
             getattr(one, name)[0] = 1.0
 
 
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda one: one.solved])
-def test_data_go_to_the_machine_code_as_it_takes_them_in_copies_too(copied):
-    """It refuses an array that nobody may change."""
-    problem = cart(scale=100.0)
-    for one in (copied(problem), problem):
-        assert one.stage_data(None).flags.writeable
-        assert one.stage_data({"wind": 0.0}).flags.writeable
-        assert not one.data.flags.writeable
-
-
 def test_a_key_says_what_a_user_wrote():
     """With all that his code reads, and not where it stands."""
     one, again = (rewritten(Nmpc, "solve", 1)(cart()) for _ in range(2))

@@ -91,19 +91,6 @@ def test_derivatives_along_any_direction_are_differences(make, solver, request):
     assert min(compared.values()) >= 2, compared
 
 
-def test_the_entries_of_the_plan_are_the_policys_derivatives():
-    nmpc = Nmpc(pendulum(), solver=Riccati(1e-11))
-    here, first = nmpc.solve([0.3, -0.2], nmpc.problem.theta), np.zeros((6, 1))
-    first[0] = 1.0
-    found = nmpc.gradient(here, value=0.0, inputs=first)
-    np.testing.assert_allclose([found.state], nmpc.policy_feedback(here), rtol=1e-5, atol=1e-7)
-    np.testing.assert_allclose([found.theta], nmpc.policy_jacobian(here), rtol=1e-5, atol=1e-7)
-    assert found.action.shape == (0,)
-    weights = np.zeros(here.primal.size)
-    assert nmpc.machine(fix_action=False).adjoint(here, weights) is not None  # no dense algebra
-    assert found.data["target"].shape == (7, 2)
-
-
 @pytest.mark.parametrize("solver", ["riccati", "fatrop"])
 def test_a_batch_has_the_gradient_of_each_and_zeros_where_a_solve_failed(solver):
     nmpc, rng = Nmpc(pendulum(), solver=solver), np.random.default_rng(0)
@@ -119,10 +106,3 @@ def test_a_batch_has_the_gradient_of_each_and_zeros_where_a_solve_failed(solver)
     assert not found.theta[4].any()
     with pytest.raises(ValueError, match=r"inputs has shape \(6, 1\); it must be \(5, 6, 1\)"):
         nmpc.gradient(batch, value, inputs[0])
-
-
-def test_weights_of_another_shape_are_refused():
-    nmpc = Nmpc(pendulum(), solver="fatrop")
-    here = nmpc.solve([0.3, -0.2], nmpc.problem.theta)
-    with pytest.raises(ValueError, match=r"inputs has shape \(1,\); it must be \(6, 1\)"):
-        nmpc.gradient(here, inputs=np.ones(1))

@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from differences import agrees
 
-from nmpcrl.control import Nmpc, Obstacle, Plant, Riccati, Task, differential_drive
-from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -71,24 +68,6 @@ def test_the_value_at_the_start_is_about_a_thousand_whatever_the_signs_of_weight
     np.testing.assert_allclose(other.features, one.features * signs, rtol=1e-5, atol=1e-5)
 
 
-@pytest.mark.parametrize("horizon", [1, 2, 25])
-@pytest.mark.parametrize("count", [0, 1, 7])
-def test_horizon_and_number_of_obstacles_are_values(solver, horizon, count):
-    obstacles = tuple(Obstacle(x - 1.0, 2.5) for x in range(count))
-    box = np.array([9.0, 9.0, np.inf])
-    task = Task(START, np.array(paper.TARGET), -box, box, obstacles)
-    how = Riccati(1e-11) if solver == "riccati" else solver
-    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=how)
-    solution = nmpc.solve(START, THETA)
-    assert solution.inputs.shape == (horizon, 2)
-    assert solution.slacks.shape == (horizon + 1, count)
-    np.testing.assert_array_equal(solution.next_action, solution.inputs[min(1, horizon - 1)])
-    later = nmpc.solve(nmpc.plant.step(START, solution.action), THETA, solution)
-    for one in (solution, later):
-        assert nmpc.kkt_residual(one) < 1e-5
-    assert solver != "riccati" or agrees(nmpc, solution, 1e-4)
-
-
 def put(name, index, number):
     """The arguments of a solve, one of whose numbers is another."""
     arguments = {"state": START.copy(), "theta": THETA.copy(), "action": np.zeros(2)}
@@ -121,31 +100,3 @@ def test_arguments_that_are_none_are_refused(fatrop, arguments, message):
     with pytest.raises(ValueError, match=message) as caught:
         fatrop.solve(**{"state": START, "theta": THETA} | arguments)
     assert "\n" not in str(caught.value)
-
-
-def test_an_action_may_be_as_large_as_its_bounds():
-    """A force in newton, beside a box of some metres."""
-    cart = Plant(lambda s, a: [s[1], a[0] / 1e5], ("x", "v"), ("force [N]",), [-2e5], [2e5])
-    box = np.full(2, 9.0)
-    task = Task(np.zeros(2), np.array([1.0, 0.0]), -box, box, (), weights=np.ones(2))
-    nmpc, theta = Nmpc(cart, task, solver="ipopt"), np.array([1, 1, 1e-5, 1, 1, 0.001])
-    plan = nmpc.solve(task.start, theta)
-    assert plan.action > 1e4
-    again = nmpc.solve(task.start, theta, plan, plan.action)
-    assert again.value == pytest.approx(plan.value)
-
-
-@pytest.mark.slow
-def test_a_smaller_tolerance_buys_exactness_with_iterations(solver, draw):
-    """From 1e-2 to 1e-12, both ends of what is allowed; 1e-8 is what is taken when none is said."""
-    kind = SOLVERS[solver]
-    nmpcs = [paper.nmpc(solver=how) for how in (kind(1e-2), kind(1e-5), kind(), kind(1e-12))]
-    solved = [[nmpc.solve(*problem) for problem in draw(20, seed=34)] for nmpc in nmpcs]
-    iterations = [sum(one.iterations for one in each) for each in solved]
-    assert iterations == sorted(iterations)
-    residuals = [
-        max(map(nmpc.kkt_residual, each)) for nmpc, each in zip(nmpcs, solved, strict=True)
-    ]
-    assert (np.diff(residuals) < 0).all()
-    assert residuals[-1] < 1e-6 * residuals[0]
-    assert kind() == kind(1e-8)

@@ -1,7 +1,5 @@
 """Rules of batches: their memory, when a batch is full, and what LSTD-Q fits."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from learning.small_runs import noise, run
@@ -58,17 +56,6 @@ def test_a_batch_of_no_step_is_refused():
         lstd_q(None, every=0)
 
 
-def test_nothing_is_remembered_but_in_the_weights(controller):
-    rule, steps = batched(td_statistics, Descent(0.1), 2), drawn(controller, 6)
-    shared = Learner("batch", SecondSolve(controller), rule, 0.9)
-    first = second = Weights(THETA)
-    for step in steps:  # two runs that take turns
-        first = shared.step(first, step).weights
-        second = shared.step(second, replace(step, cost=-step.cost)).weights
-    np.testing.assert_array_equal(first.theta, after(shared, steps))
-    assert not np.allclose(second.theta, first.theta)
-
-
 def test_lstd_q_fits_a_linear_value_to_its_targets_in_one_step(controller):
     steps = drawn(controller, 20)
     phi = np.array([step.state for step in steps])
@@ -119,7 +106,3 @@ def test_learners_keep_theta_within_the_bounds_of_the_problem(tank, make):
     gains = np.array([step.weights.theta[0] for step in steps if not step.failure])
     assert ((gains >= 0.2) & (gains <= 0.6)).all()
     assert len(set(gains)) > 1
-
-
-def test_the_papers_controller_has_no_bounds_of_theta(robot):
-    assert expected_sarsa(robot, 1e-7).bounds is None

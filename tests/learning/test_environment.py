@@ -4,23 +4,18 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 import pytest
 from learning.small_runs import THETA, noise, run
 
-from nmpcrl.control import Ipopt, Nmpc, Plant, Problem, differential_drive
+from nmpcrl.control import Plant, differential_drive
 from nmpcrl.control.solution import short
 from nmpcrl.learning import (
     Diverged,
-    Weights,
     evaluate,
     expected_sarsa,
-    frozen,
-    gradient_tdc,
     q_learning,
 )
-from nmpcrl.learning.training import absurd
 
 PRICES = np.array([0.1, 2.0, 0.5, 0.1, 3.0])
 
@@ -135,86 +130,6 @@ def test_an_error_inside_a_function_of_the_user_is_that_error(tank, broken):
         evaluate(tank, tank.problem.theta, 2, **SELLING | {broken: lambda: None})
     with pytest.raises(TypeError, match=r"^mine$"):
         evaluate(tank, tank.problem.theta, 2, **SELLING | {broken: fails})
-
-
-class Overwriting:
-    """A store that overwrites its arguments and results; where it is careful, copies of them."""
-
-    def __init__(self, *, careful):
-        self.own = np.copy if careful else np.asarray
-        self.state, self.price, self.asked = np.array([0.2]), np.zeros(4), []
-        self.world = {"plant": self.plant, "start": self.start, "data": self.data}
-
-    def start(self, rng):
-        self.state[:] = 0.2
-        return self.own(self.state)
-
-    def plant(self, state, action, rng):
-        assert (state.dtype, action.dtype) == (float, float)
-        state, action = self.own(state), self.own(action)
-        self.asked.append("plant")
-        np.clip(action, 0.1, 0.2, out=action)
-        state *= 0.8
-        state += action
-        self.state[:] = state
-        return self.own(self.state), np.float32(action[0]), np.bool_(False)
-
-    def data(self, t):
-        self.asked.append(t)
-        self.price[:] = t % 3
-        return {"price": self.own(self.price)}
-
-
-def test_functions_of_the_user_may_work_in_place(tank):
-    theta, found = tank.problem.theta.copy(), []
-    for careful in (True, False):
-        for start in ({}, {"start": np.array([0.2])}):
-            how = Overwriting(careful=careful).world | start
-            ran = evaluate(tank, theta, 4, **how)
-            steps = run(q_learning(tank, 1e-2), tank, noise(2, 3, 1, deviation=0.1), **how)
-            rows = [(s.state, s.action, s.weights.theta, s.plan.data.ravel()) for s in steps]
-            found.append([*ran.states, *ran.actions, *map(np.concatenate, rows)])
-    for other in found[1:]:
-        np.testing.assert_array_equal(np.concatenate(found[0]), np.concatenate(other))
-    np.testing.assert_array_equal(theta, tank.problem.theta)
-
-
-def test_nothing_is_asked_of_a_time_before_its_turn(tank):
-    store = Overwriting(careful=True)
-    run(expected_sarsa(tank, 1e-3), tank, noise(1, 3, 1), **store.world)
-    assert store.asked == [0, "plant", 1, "plant", 2, "plant", 3]
-
-
-def test_an_int_seeds_another_stream_than_that_of_the_noise(tank):
-    """Each draw of noise, of a plant in training and of one in a rollout is a number of its own."""
-    drawn = []
-
-    def drawing(state, action, rng):
-        drawn.append(rng.normal())
-        return 0.9 * state, 0.0, False
-
-    how = {"plant": drawing, "start": [0.1]}
-    for rng in (0, np.int64(0), np.random.default_rng(0)):
-        run(frozen(tank), tank, noise(1, 3, 1), **how, rng=rng)
-        evaluate(tank, tank.problem.theta, 3, **how, rng=rng)
-    one, same, given = np.reshape(drawn, (3, 6))
-    np.testing.assert_array_equal(one, same)
-    np.testing.assert_array_equal(given, np.random.default_rng(0).normal(size=6))
-    assert np.unique([*one, *given[:3]]).size == 9
-
-
-def test_theta_may_be_learned_as_large_as_it_is_solved_with():
-    problem = Problem(
-        states=1, inputs=1, horizon=3, gamma=0.9, theta={"rate": 7e10}, lower=-1, upper=1,
-        model=lambda x, u, th: 0.9 * x + 0.1 * u - 1e-12 * th["rate"] * x,
-        stage=lambda x, u, th: ca.sumsqr(x) + ca.sumsqr(u),
-    )  # fmt: skip
-    nmpc = Nmpc(problem, solver=Ipopt())
-    how = {"plant": lambda x, u, rng: (0.9 * x + 0.1 * u, x[0] ** 2, False), "start": [0.5]}
-    for learner in (frozen(nmpc), gradient_tdc(nmpc, 1.0, 1.0)):
-        assert len(run(learner, nmpc, noise(1, 3, 1), **how)) == 3
-    far = [Weights(np.array([one]), np.array([1e10])) for one in (7e13, 8e13, np.nan)]
-    assert [bool(absurd(one, nmpc.largest)) for one in far] == [False, True, True]
 
 
 def test_a_plan_sees_the_data_of_its_stages(tank):

@@ -20,15 +20,12 @@ from nmpcrl.learning import (
     frozen,
     gradient_expected_sarsa,
     gradient_tdc,
-    lstd_q,
-    policy_gradient,
     q_learning,
     random_direction,
     regularized_deep_expected_sarsa,
     step_matched,
 )
 from nmpcrl.learning.learners import gradient_td
-from nmpcrl.learning.remedies import averaged, guarded, normalised_ges, tdrc
 
 ALPHA, BETA = 0.1, 0.01
 THETA, W = np.array([1.0, 0.5, -1.0]), np.array([0.1, 0.0, 0.2])
@@ -77,13 +74,6 @@ def test_a_step_by_hand(controller, network, transition, weights, name):
         np.testing.assert_array_equal(moved(learner, one, step), expected)
 
 
-def test_weights_begin_with_w_zero_if_none_is_given(controller, transition):
-    np.testing.assert_array_equal(Weights(THETA).w, np.zeros(3))
-    learner = gradient_expected_sarsa(controller, ALPHA, BETA)
-    first = learner.step(Weights(THETA), transition(THETA)).weights
-    np.testing.assert_allclose([first.theta, first.w], [ES, BETA * DELTA * PHI])
-
-
 @pytest.mark.parametrize(
     ("make", "inputs"), [(deep_expected_sarsa, 5), (regularized_deep_expected_sarsa, 8)]
 )
@@ -113,14 +103,6 @@ def test_functions_for_rules_and_bootstraps_without_features_are_refused(
         mismatched.step(weights, transition(THETA))
 
 
-@pytest.mark.parametrize("make", [BY_HAND["ES"][0], BY_HAND["GES"][0], lambda c, _: lstd_q(c)])
-def test_nothing_is_learned_from_an_episode_that_failed(controller, transition, weights, make):
-    learner = make(controller, None)
-    for before in (weights, learner.step(weights, transition(THETA)).weights):
-        after = learner.interrupted(before)
-        np.testing.assert_array_equal([after.theta, after.w], [before.theta, before.w])
-
-
 def test_a_rule_of_the_user_has_a_memory_and_hears_of_failed_episodes(
     controller, transition, weights
 ):
@@ -141,21 +123,6 @@ def test_a_rule_of_the_user_has_a_memory_and_hears_of_failed_episodes(
     np.testing.assert_array_equal(first.w, W)
     bounded = replace(learner, bounds=(np.full(3, -1.5), np.ones(3)))
     np.testing.assert_array_equal(bounded.step(weights, one).weights.theta, np.clip(ES, -1.5, 1.0))
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lstd_q,
-        lambda c: averaged(gradient_expected_sarsa(c, ALPHA, BETA)),
-        lambda c: guarded(tdrc(c, ALPHA), ALPHA),
-        lambda c: normalised_ges(c, ALPHA),
-        policy_gradient,
-    ],
-)
-def test_learners_can_be_pickled(controller, make):
-    again = pickle.loads(pickle.dumps(make(controller)))
-    assert again.name == make(controller).name
 
 
 def test_matched_is_as_long_as_ges_in_the_direction_of_es_and_stays_where_that_has_none(
@@ -183,17 +150,6 @@ def test_random_steps_are_as_long_as_those_of_es_and_favour_no_direction(
     np.testing.assert_allclose(lengths, np.linalg.norm(ES - THETA))
     along = steps / lengths @ axis / np.linalg.norm(axis)
     assert kstest(along, "uniform", args=(-1, 2)).pvalue > 1e-3
-
-
-def test_random_directions_come_from_the_given_generator_alone(controller, transition, weights):
-    learners = [random_direction(controller, ALPHA, np.random.default_rng(k)) for k in (5, 5, 6)]
-    learners.append(copy.deepcopy(learners[0]))
-    one, same, other, copied = (
-        [moved(learner, weights, transition(THETA)).tolist() for _ in range(3)]
-        for learner in learners
-    )
-    assert one == same == copied != other
-    assert one[0] != one[1]
 
 
 @pytest.mark.parametrize(

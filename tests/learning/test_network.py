@@ -2,14 +2,13 @@
 
 import copy
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 import torch
 
 from nmpcrl.learning import QNetwork
-from nmpcrl.learning.network import Target, fit_in_torch, in_torch, machine_code, weights_of
+from nmpcrl.learning.network import fit_in_torch, in_torch, weights_of
 
 SCALED = {"scales": (np.array([4.0, 0.3]), 250.0)}  # for two inputs
 OPTIONS = [{}, {"activation": "tanh"}, SCALED, {"activation": "tanh", **SCALED}]
@@ -67,16 +66,6 @@ def test_it_is_torchs_network_and_adam_step_by_step(inputs, activation):
     np.testing.assert_allclose(learner.predict(some), expected, rtol=1e-3, atol=1e-4)
 
 
-def test_the_gradient_is_that_of_autograd():
-    learner, model = beside_torch(5)
-    descent, before = torch.optim.SGD(model.parameters(), lr=1.0), weights_of(model)
-    learner.fit()
-    fit_in_torch(model, descent, *drawn_by(learner, 5))
-    expected = before - weights_of(model)
-    assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(learner.net[0][1], expected, rtol=1e-4, atol=1e-6)
-
-
 @pytest.mark.parametrize("options", OPTIONS)
 @pytest.mark.parametrize("batch", [1, 3, 64])
 def test_the_loss_is_the_mean_squared_error_before_the_step(options, batch):
@@ -98,16 +87,6 @@ def test_every_row_is_remembered_or_the_latest_ones_of_a_memory(count, capacity,
     assert len(learner) == left
     expected = squared_error(network(), (inputs[-left:], targets[-left:]))
     assert learner.fit() == pytest.approx(expected, rel=1e-5)
-
-
-def test_compiled_code_has_as_much_room_as_was_reserved():
-    learner = network(capacity=4)
-    learner.reserve(10)
-    for _ in range(len(learner.net[1])):
-        machine_code().remember(learner.net, np.zeros(2), 0.0)
-    with pytest.raises(IndexError, match="no room for another example"):
-        machine_code().remember(learner.net, np.zeros(2), 0.0)
-    assert len(learner) >= 10
 
 
 @pytest.mark.parametrize(
@@ -135,13 +114,6 @@ def test_torchs_generator_and_default_type_neither_decide_the_weights_nor_change
         assert torch.equal(torch.random.get_rng_state(), before)
     finally:
         torch.set_default_dtype(torch.float32)
-
-
-def test_networks_that_begin_at_once_in_several_threads_begin_as_they_do_alone():
-    alone = [network(seed=seed).weights for seed in range(200)]
-    with ThreadPoolExecutor(4) as threads:
-        together = threads.map(lambda seed: network(seed=seed).weights, range(200))
-        np.testing.assert_array_equal(alone, list(together))
 
 
 def test_seeds_decide_every_bit_and_a_memory_that_is_not_full_none():
@@ -183,31 +155,6 @@ def test_a_copy_goes_on_as_the_original_does_without_it(again, options):
             learner.fit()
         predictions.append(learner.predict(rows(9)[0]))
     np.testing.assert_array_equal(predictions, predictions[:1] * 3)
-
-
-@pytest.mark.parametrize("again", [copy.deepcopy, PICKLED])
-def test_the_copy_of_a_target_follows_the_copy_of_its_network(again):
-    learner = taught(rows(140))
-    target, twin = again((Target(learner, rate=0.5), learner))
-    before = target.predict(rows(9)[0])
-    twin.fit()
-    target.follow()
-    assert not np.array_equal(target.predict(rows(9)[0]), before)
-    assert target.fitted
-    assert not learner.fitted
-
-
-def test_the_generator_of_mini_batches_is_splitmix64():
-    """The numbers for this seed at https://rosettacode.org/wiki/Pseudo-random_numbers/Splitmix64."""
-    draw = np.array([1234567], np.uint64)
-    uniform = machine_code().dense.uniform.py_func
-    with np.errstate(over="ignore"):
-        found = [uniform(draw) for _ in range(5)]
-    expected = [
-        6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431,
-        16408922859458223821,
-    ]  # fmt: skip
-    assert found == [number // 2**12 / 2**52 for number in expected]
 
 
 def test_a_mini_batch_holds_no_example_twice_and_each_as_often():

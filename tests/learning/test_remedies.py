@@ -128,24 +128,6 @@ def test_undo_goes_back_to_the_best_theta_and_w(controller, ends, weights):
     np.testing.assert_array_equal(judged_theta(fourth), fourth.theta)
 
 
-def test_a_rollout_that_writes_into_its_theta_moves_nothing(controller, ends, weights):
-    def judge(theta: np.ndarray) -> float:
-        theta[:] = 0.0
-        return 1.0
-
-    base = expected_sarsa(controller, 0.01)
-    path, found = in_turn(base, weights, ends), in_turn(undo(base, judge), weights, ends)
-    np.testing.assert_array_equal([one.theta for one in found], [one.theta for one in path])
-
-
-def test_undo_confirms_only_where_its_episodes_are_over(controller, transition, weights):
-    judge = Mock(side_effect=[3.0, 2.0, 1.0])
-    learner = undo(expected_sarsa(controller, 0.01), judge, every=2)
-    one = transition(weights.theta)
-    in_turn(learner, weights, [replace(one, last=last) for last in (0, 1, 0, 1, 1, 0, 1, 1)])
-    assert judge.call_count == 3
-
-
 @pytest.mark.parametrize("wrap", [lambda one: one, averaged])
 def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition, weights, wrap):
     """Whether it had a step or none, and under an average, too."""
@@ -171,11 +153,3 @@ def test_undone_and_averaged_theta_stays_within_the_bounds(controller, transitio
         np.testing.assert_array_equal(judged_theta(found), found.theta)
         np.testing.assert_array_equal(found.theta, np.clip(found.theta, *bounds))
     np.testing.assert_array_equal(asked(judge)[-1], found.theta)
-
-
-@pytest.mark.parametrize("make", [lambda c: expected_sarsa(c, 0.01), lstd_q])
-def test_undo_that_never_has_to_and_an_average_are_the_learner(controller, ends, weights, make):
-    base = make(controller)
-    wanted = in_turn(base, weights, ends)[-1].theta
-    for learner in (undo(base, lambda theta: 0.0), averaged(base)):
-        np.testing.assert_array_equal(in_turn(learner, weights, ends)[-1].theta, wanted)

@@ -8,44 +8,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import Hard, Nmpc, Parameter, Problem, Soft, rk4
+from nmpcrl.control import Hard, Nmpc, Parameter, Problem, Soft
 from nmpcrl.learning import learn
 
 pytestmark = pytest.mark.slow
-
-
-def model_of(rate, period):
-    """The discrete-time model of a derivative."""
-    return lambda x, u, th, *d: rk4(lambda x, u: rate(x, u, th, *d), x, u, period)
-
-
-def test_a_cart_pole():
-    def rate(x, u, th):
-        s, c = ca.sin(x[2]), ca.cos(x[2])  # the angle from upright
-        push = (u + 0.1 * th["length"] * x[3] ** 2 * s) / 1.1
-        turn = (9.81 * s - push * c) / (th["length"] * (4 / 3 - 0.1 * c**2 / 1.1))
-        return ca.vertcat(x[1], push - 0.1 * th["length"] * turn * c / 1.1, x[3], turn)
-
-    problem = Problem(
-        states=4, inputs=1, horizon=20, gamma=0.95, lower=-10, upper=10,
-        theta={"length": Parameter(0.4, 0.1, 2.0), "V0": 0.0},
-        model=model_of(rate, 0.05),
-        stage=lambda x, u, th: x[0] ** 2 + 10 * x[2] ** 2 + 0.1 * x[3] ** 2 + 0.01 * u**2,
-        terminal=lambda x, th: 10 * ca.sumsqr(x),
-        initial=lambda x, th: th["V0"],
-    )  # fmt: skip
-    truth = problem.vector(length=0.8)
-
-    def plant(x, u, rng):
-        return problem.step(x, u, truth), problem.cost(x, u), abs(x[2]) > 1
-
-    def start(rng):
-        return [0, 0, *rng.uniform(-0.3, 0.3, 2)]
-
-    nmpc = Nmpc(problem, solver="fatrop")
-    result = learn(nmpc, plant=plant, start=start, episodes=6, steps=25, confirm=1)
-    assert result.theta["length"] == pytest.approx(0.8, abs=0.08)
-    assert result.costs[-1] < result.costs[0]
 
 
 def test_a_building_with_prices_and_hard_comfort():
@@ -82,52 +48,6 @@ def test_a_building_with_prices_and_hard_comfort():
     result = learn(Nmpc(problem, solver="fatrop"), every=12, **world)
     assert result.theta["leak"] == pytest.approx(0.04, abs=0.004)
     assert (result.history["state"][1:48, 0] > 19.5).all()
-
-
-def test_a_chain_of_eight_states():
-    def rate(x, u, th):
-        place = ca.vertcat(0, x[:4])  # four masses in a row, the first held by a wall
-        pull = th["stiffness"] * (place[1:] - place[:-1])
-        return ca.vertcat(x[4:], ca.vertcat(pull[1:], u) - pull - 0.2 * x[4:])
-
-    problem = Problem(
-        states=8, inputs=1, horizon=15, gamma=0.95, lower=-2, upper=2,
-        theta={"stiffness": Parameter(1.0, 0.2, 5.0), "V0": 0.0},
-        model=model_of(rate, 0.3),
-        stage=lambda x, u, th: ca.sumsqr(x) + 0.1 * u**2,
-        terminal=lambda x, th: 5 * ca.sumsqr(x),
-        initial=lambda x, th: th["V0"],
-    )  # fmt: skip
-    truth = problem.vector(stiffness=1.6)
-
-    def plant(x, u, rng):
-        return problem.step(x, u, truth), problem.cost(x, u), False
-
-    def start(rng):
-        return rng.uniform(-1, 1, 8)
-
-    nmpc = Nmpc(problem, solver="fatrop")
-    result = learn(nmpc, plant=plant, start=start, episodes=6, steps=30)
-    assert result.theta["stiffness"] == pytest.approx(1.6, abs=0.16)
-
-
-def test_a_tank_of_one_state():
-    problem = Problem(
-        states=1, inputs=1, horizon=8, gamma=0.9, lower=0, upper=2, state_lower=0.01,
-        theta={"valve": Parameter(0.5, 0.1, 2.0), "V0": 0.0},
-        model=lambda x, u, th: x + 0.5 * (u - th["valve"] * ca.sqrt(ca.fmax(x, 1e-3))),
-        stage=lambda x, u, th: (x - 1) ** 2 + 0.1 * u**2,
-        initial=lambda x, th: th["V0"],
-    )  # fmt: skip
-    truth = problem.vector(valve=0.8)
-
-    def plant(x, u, rng):
-        return problem.step(x, u, truth), problem.cost(x, u), False
-
-    nmpc = Nmpc(problem, solver="fatrop")
-    result = learn(nmpc, plant=plant, start=[0.3], episodes=8, steps=20, confirm=1)
-    assert result.theta["valve"] == pytest.approx(0.8, abs=0.05)
-    assert result.costs[-1] < result.costs[0]
 
 
 def test_a_robot_among_moving_obstacles():

@@ -5,14 +5,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 from builders import raising
 from wasm_host import Controller, Module
 
-from nmpcrl.control import Nmpc, Obstacle, Plant, Task, differential_drive
-from nmpcrl.control.browser import texts
+from nmpcrl.control import Nmpc, Obstacle, differential_drive
 from nmpcrl.control.codegen import browser
 from nmpcrl.control.codegen.browser import from_texts
 from nmpcrl.control.codegen.browser.link import FUNCTIONS, PAGES
@@ -115,29 +113,6 @@ def test_a_rollout_without_noise_is_that_of_the_machine_code(robot_module):
         assert found["iterations"] == expected.iterations
 
 
-def test_a_plant_of_the_readers_own_compiles_as_well():
-    mass = Plant(
-        dynamics=lambda state, push: ca.vertcat(state[2:], push),
-        state_names=("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
-        action_names=("a_x [m/s2]", "a_y [m/s2]"),
-        lower=-np.ones(2),
-        upper=np.ones(2),
-    )
-    task = Task(
-        start=np.zeros(4),
-        target=np.array([4.0, 2.0, 0.0, 0.0]),
-        lower=np.full(4, -9.0),
-        upper=np.full(4, 9.0),
-        obstacles=(Obstacle(2.0, 0.5),),
-        weights=np.array([1.0, 1.0, 0.1, 0.1]),
-    )
-    nmpc = Nmpc(mass, task)
-    there = Controller(Module(from_texts(texts(mass, task))), nmpc)
-    theta = np.array([1, 1, 0.1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.1, 0.001])
-    for found, expected in plans(there, nmpc, theta, 20):
-        assert differs(found, expected) < TOLERANCE
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_values_gradients_and_products_are_those_of_the_machine_code(robot_module, seed):
     nmpc, state, theta, action = drawn(seed)
@@ -179,10 +154,6 @@ def test_where_a_start_fails_the_next_one_is_tried_in_the_same_order(robot_modul
     assert seen - {0}
 
 
-def test_a_module_asks_its_host_for_four_functions(robot_module):
-    assert Module(robot_module).imports == ["cos", "log", "pow", "sin"]
-
-
 def test_the_largest_layout_fits_and_a_host_that_reserves_too_much_is_told(robot_module):
     module = Module(robot_module)
     obstacles = tuple(Obstacle(0.4 * k, 6.0) for k in range(MOST_OBSTACLES))
@@ -199,27 +170,9 @@ def test_the_largest_layout_fits_and_a_host_that_reserves_too_much_is_told(robot
         there.solve(start, THETA)
 
 
-def test_solves_leak_no_memory(robot_module):
-    """Scratch is whole at each call."""
-    nmpc = paper.nmpc("A")
-    there = Controller(Module(robot_module), nmpc)
-    before = there.module("reserve", 8)
-    plan = None
-    for _ in range(300):
-        plan = there.solve(nmpc.task.start, THETA, plan)
-    assert there.module("reserve", 8) == before + 16
-
-
 def test_arrays_are_given_back_when_nothing_refers_to_them_any_more():
     """240 MB of them, one after the other, in the 4 MB of a module."""
     assert Module(from_texts({"arrays": ARRAYS}))("f", 10_000) == 3.0 * sum(range(10_000)) + 10
-
-
-def test_a_call_too_deep_is_an_error():
-    module = Module(from_texts(of_x("f(x - 1.0) * f(x - 2.0) + x if x > 0.0 else 1.0")))
-    assert module("f", 2.0) == 4.0
-    with pytest.raises(RuntimeError):
-        module("f", 1e9)
 
 
 def test_a_module_is_made_once_with_the_same_bytes_and_again_after_damage(tmp_path, monkeypatch):

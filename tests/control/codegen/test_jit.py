@@ -122,22 +122,6 @@ def test_other_text_or_another_numba_is_other_code(cache, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("chosen", "place"),
-    [
-        ({}, Path.home() / ".cache/nmpcrl"),
-        ({"XDG_CACHE_HOME": "/somewhere"}, Path("/somewhere/nmpcrl")),
-        ({"XDG_CACHE_HOME": "/somewhere", "NMPCRL_CACHE": "/here"}, Path("/here")),
-    ],
-)
-def test_the_cache_is_where_the_user_wants_it(monkeypatch, chosen, place):
-    for name in ("NMPCRL_CACHE", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-        if name in chosen:
-            monkeypatch.setenv(name, chosen[name])
-    assert folder.chosen() == place
-
-
-@pytest.mark.parametrize(
     ("text", "error", "words"),
     [
         (TEXT + "\nraise KeyboardInterrupt('now')\n", KeyboardInterrupt, "now"),
@@ -226,13 +210,6 @@ def test_what_an_unfit_folder_cannot_keep_a_temporary_one_does(cache, monkeypatc
     assert not cache.is_dir() or not packages(cache)
 
 
-def test_where_no_folder_can_be_had_the_reason_is_raised(cache, monkeypatch):
-    cache.touch()
-    monkeypatch.setattr(tempfile, "mkdtemp", raising(FULL))
-    with pytest.raises(OSError, match="No space left on device"):
-        jit.load("nowhere", {"__init__": ""})
-
-
 def test_packages_are_the_users_alone_and_one_that_is_not_is_not_loaded(cache, capsys):
     texts = {"__init__": "x = 1\n"}
     found = jit.load("opened", texts)
@@ -244,10 +221,3 @@ def test_packages_are_the_users_alone_and_one_that_is_not_is_not_loaded(cache, c
     assert not jit.load("opened", texts).__file__.startswith(str(cache))
     reason = f"others may write to {place}, which `chmod go-w` ends"
     assert capsys.readouterr().err == reason + ELSEWHERE
-
-
-def test_rights_are_not_asked_where_a_mode_tells_none(cache, monkeypatch):
-    cache.mkdir()
-    cache.chmod(0o777)
-    monkeypatch.delattr(os, "getuid")
-    assert jit.load("windows", {"__init__": ""}).__file__.startswith(str(cache))

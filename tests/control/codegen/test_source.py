@@ -76,22 +76,6 @@ def test_the_entries_of_a_sparse_argument_are_found_and_a_scalar_is_returned():
     assert callable_of(ca.Function("product", [x, y], [x * y]), scalar=True)([3], [4]) == 12.0
 
 
-@pytest.mark.parametrize(
-    ("results", "options", "line"),
-    [
-        ({"y": many[0] * many[1]}, {"returned": True}, "    return w"),
-        ({"y": many[0] * many[1]}, {}, "    y_[0] = w"),
-        ({"y": many, "B": many[0]}, {"matrices": ("B",)}, "    B_[0, 0] = w"),
-        ({"y": many}, {"shifted": {"y": "at"}}, "    y_[at + 1] = w"),
-        ({"y": many}, {"added": ("y",)}, "    y_[1] += w"),
-        ({"y": ca.SX(0, 1), "h": ca.SX(0, 1)}, {}, "def f(x, y_, h_):\n    pass\n"),
-    ],
-)
-def test_a_result_is_written_as_it_is_asked(results, options, line):
-    function = ca.Function("f", [many], [*results.values()], ["x"], [*results])
-    assert line in source(function, **options)
-
-
 def test_the_stages_are_the_functions_that_model_promises(problem):
     promised = {name for name, one in vars(model).items() if one is model._generated}
     written = {re.sub("_(fixed|line)$", "_rows", one.name()) for one in functions(problem)}

@@ -5,8 +5,6 @@ KKT conditions are written with CasADi.
 """
 
 import json
-from contextlib import suppress
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -29,8 +27,6 @@ from nmpcrl.control import (
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import lagrangian
 from nmpcrl.control.solvers.stages import STEEP
-from nmpcrl.control.solvers.starts import random_inputs
-from nmpcrl.study import paper
 
 ROBOT, MASS = differential_drive(), point_mass(bound=2.0)  # the mass is linear, with four states
 KKT = 2e-8  # left of the conditions in their units, see `residual`: mu and its error, 1e-8 each
@@ -254,58 +250,6 @@ def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(plant, la
             restarted += solution.status == "restarted"
     assert failed <= failures
     assert restarted <= 12
-
-
-@pytest.mark.weekly
-@pytest.mark.slow
-def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
-    """Ipopt from standing still, and nine times from other inputs; worse is by 0.1 %."""
-    compared, worse = 0, {1: 0, 9: 0}
-    for layout in range(4):
-        rng = np.random.default_rng([5, layout])
-        nmpc = controller(rng)
-        solvers = {starts: like(nmpc, solver=Riccati(starts=starts)) for starts in worse}
-        ipopt = like(nmpc, solver="ipopt")
-        for _ in range(10):
-            problem, values = drawn(rng, nmpc), []
-            try:
-                found = {starts: problem.solve(one) for starts, one in solvers.items()}
-            except SolverError:
-                continue
-            start = replace(found[1], point=np.zeros_like(found[1].point))
-            start.point[start.ocp.states] = problem.state
-            for seed in range(19, 29 if found[1].violation <= 1e-6 else 0):
-                inputs = random_inputs(ROBOT, seed, nmpc.horizon) if seed > 19 else 0.0
-                start.point[start.ocp.inputs] = inputs
-                with suppress(SolverError):
-                    values.append(problem.solve(ipopt, start).value)
-            if not values:
-                continue
-            compared += 1
-            for starts, solution in found.items():
-                worse[starts] += solution.value - min(values) > 1e-3 * max(abs(min(values)), 1e-6)
-    assert compared >= 20
-    assert worse[9] <= 0.03 * compared
-    assert worse[9] <= worse[1]
-
-
-@pytest.mark.slow
-def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
-    """One start ends where Ipopt's does; several, the default, may find lower minima."""
-    alone, same, worse = paper.nmpc(solver=Riccati(starts=1)), 0, 0
-    for state, theta in draw(100, seed=40):
-        solution, best = (nmpc.solve(state, theta) for nmpc in (alone, controllers["riccati"]))
-        assert max(solution.violation, best.violation) <= 1e-6
-        ipopt = controllers["ipopt"].solve(state, theta)
-        worse += best.value > ipopt.value * (1 + 1e-6)
-        if solution.value != pytest.approx(ipopt.value, rel=1e-6):
-            assert np.abs(solution.states - ipopt.states).max() > 1e-2
-            continue
-        same += 1
-        scale = np.abs(ipopt.features).max()
-        np.testing.assert_allclose(solution.features, ipopt.features, atol=1e-5 * scale)
-    assert same >= 92
-    assert worse <= 1
 
 
 @pytest.mark.weekly

@@ -11,7 +11,6 @@ import pytest
 
 from nmpcrl.control import Nmpc, Problem, Soft, SolverError, Status, differential_drive
 from nmpcrl.control.nmpc import ABSURD
-from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
 CASADI_SOLVERS = ("fatrop", "ipopt")
@@ -56,26 +55,6 @@ def test_a_solve_changes_no_argument_and_gives_the_same_bits_again(robot, theta)
     assert one.value == other.value
     np.testing.assert_array_equal(one.features, other.features)
     np.testing.assert_array_equal(one.point, other.point)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("giver", SOLVERS)
-@pytest.mark.parametrize("fixed", [False, True])
-def test_a_solution_of_any_solver_is_a_warm_start_for_any_other(
-    controllers, robot, draw, giver, fixed
-):
-    """Also one with u_0 free for one with u_0 fixed, and the other way round."""
-    same = 0
-    for state, theta in draw(6, seed=24):
-        action = np.array([0.2, -0.4])
-        first, then = (None, action) if fixed else (action, None)
-        warm_start = controllers[giver].solve(state, theta, None, first)
-        with_it, without = (robot.solve(state, theta, g, then) for g in (warm_start, None))
-        same += with_it.value == pytest.approx(without.value, rel=1e-6)
-        after = robot.plant.step(state, warm_start.action)
-        inside = np.clip(after, robot.task.lower, robot.task.upper)
-        assert robot.kkt_residual(robot.solve(inside, theta, warm_start, then)) < 1e-4
-    assert same >= 5
 
 
 @of_casadi

@@ -37,8 +37,3 @@ def test_the_closed_loop_costs_what_optimal_plans_do():
         for one in ("riccati", real_time())
     ]
     assert costs[1] == pytest.approx(costs[0], rel=1e-2)
-
-
-def test_a_number_of_steps_that_is_none_is_refused():
-    with pytest.raises(ValueError, match="steps = 0 must be a whole number, 1 or more"):
-        real_time(0)

@@ -1,7 +1,5 @@
 """riccati: the box as a penalty, second tries, how it gives up, and what replaces it."""
 
-import sys
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ from scipy.special import erfinv
 from nmpcrl.control import Fatrop, Nmpc, Plant, Riccati, SolverError, Task
 from nmpcrl.control.codegen import jit
 from nmpcrl.control.solvers.nlpsol import Program
-from nmpcrl.control.solvers.riccati import machine_code
 from nmpcrl.report.trace import interpreted
 from nmpcrl.study import paper
 
@@ -39,21 +36,6 @@ def test_from_outside_there_is_a_plan_that_says_how_far_it_leaves_the_box(riccat
     assert (np.abs(solution.inputs) <= riccati.plant.upper).all()
 
 
-def test_from_far_outside_the_plan_heads_for_the_box_as_fast_as_it_can(riccati):
-    solution = riccati.solve(np.array([50.0, 1.0, np.pi]), THETA)
-    np.testing.assert_allclose(np.diff(solution.states[:, 0]), -0.12, atol=1e-4)
-
-
-def test_inside_nothing_is_violated_whatever_a_slack_costs(riccati):
-    """The box outweighs the obstacles even where these are dear."""
-    task = paper.task()
-    for omega in (1.0, 100.0, 1e4):
-        nmpc = Nmpc(riccati.plant, task, slack_weight=omega)
-        for obstacle in task.obstacles:
-            state = np.array([obstacle.x, -2.99, -np.pi / 2])
-            assert nmpc.solve(state, THETA).violation <= 1e-6
-
-
 def limited(**limits: int) -> Nmpc:
     """The paper's controller run by Python, with other limits of iterations and one cold start."""
     plain = interpreted(paper.nmpc().problem)
@@ -71,15 +53,6 @@ def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati):
     same = nmpc.solve(START, other, warm_start)
     assert (same.restarts, same.status) == (2, "restarted")
     assert shifted.value == pytest.approx(cold.value)
-
-
-def test_a_warm_start_of_nans_does_no_harm(riccati):
-    warm_start, exact = riccati.solve(START, THETA), riccati.solve(START, THETA)
-    warm_start.point[:] = np.nan
-    for state in (START, START + 1e-3):
-        solution = riccati.solve(state, THETA, warm_start)
-        assert np.isfinite(solution.point).all()
-        assert solution.value == pytest.approx(exact.value, rel=1e-2)
 
 
 def test_when_it_gives_up_it_says_what_it_tried(monkeypatch):
@@ -130,16 +103,3 @@ def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatc
     assert nmpc.task.stage_cost(state, action) == pytest.approx(cost)
     (said,) = (str(one.message) for one in recwarn if WARNING in str(one.message))
     assert reason in said
-
-
-def test_only_what_is_called_from_python_is_compiled_for_it(riccati):
-    package = machine_code(riccati.problem).__module__.rpartition(".")[0]
-    jitted = {
-        found.__name__: found.targetoptions.get("no_cpython_wrapper", False)
-        for name, module in list(sys.modules.items())
-        if name.startswith(f"{package}.")
-        for found in vars(module).values()
-        if hasattr(found, "targetoptions")
-    }
-    assert {"factorise", "expand_stage"} < set(jitted)
-    assert {name for name, inner in jitted.items() if not inner} == {"find"}

@@ -5,8 +5,6 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from nmpcrl.control import (
-    Fatrop,
-    Ipopt,
     Nmpc,
     Obstacle,
     Problem,
@@ -15,8 +13,8 @@ from nmpcrl.control import (
     Task,
     differential_drive,
 )
-from nmpcrl.control.solvers import SOLVERS, TOLERANCE, solver_of
-from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
+from nmpcrl.control.solvers import SOLVERS
+from nmpcrl.control.solvers.starts import MOST, cold_inputs
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -36,14 +34,6 @@ BEFORE = np.array([0.0, 0.0, 0.0])  # a wall stands between here and the target
 def test_an_option_out_of_range_is_refused(kind, option, value, allowed):
     with pytest.raises(ValueError, match=rf"^{option} = {value} must {allowed}"):
         kind(**{option: value})
-
-
-def test_a_name_stands_for_the_solver_with_its_defaults():
-    named = {name: solver_of(name) for name in SOLVERS}
-    assert named == {"riccati": Riccati(), "fatrop": Fatrop(), "ipopt": Ipopt()}
-    assert {solver.tolerance for solver in named.values()} == {TOLERANCE}
-    assert all(solver.name == name for name, solver in named.items())
-    assert Ipopt(tolerance=1e-5) not in (Ipopt(), Fatrop(tolerance=1e-5))
 
 
 def before_a_wall(starts: int) -> Nmpc:
@@ -100,23 +90,3 @@ def test_all_starts_that_can_be_asked_for_lie_within_the_bounds_and_differ():
     found = cold_inputs(robot, 10, MOST - 1)
     assert len({u.tobytes() for u in found}) == MOST - 1
     assert all(((robot.lower <= u) & (u <= robot.upper)).all() for u in found)
-
-
-@pytest.mark.parametrize(
-    ("lower", "upper", "held"),
-    [
-        (-np.inf, np.inf, [0.4, -0.4, 1.0, -1.0]),
-        (-1.6, 1e3, [0.4, -0.4, 1.0, -1.0]),
-        (-0.5, 5.0, [2.0, -0.2, 5.0, -0.5]),
-        (3.0, 20.0, [8.0, 3.0, 20.0, 3.0]),
-    ],
-)
-def test_an_input_is_held_near_its_bounds_where_these_are_wide_and_else_within_one(
-    lower, upper, held
-):
-    """Drawn ones lie within one of rest and between the bounds, wherever these are."""
-    problem = line(lower, upper)
-    assert [u[0, 0] for u in cold_inputs(problem, 2, 4)] == held
-    inputs = random_inputs(problem, 0, 50)
-    assert lower <= inputs.min() < inputs.max() <= upper
-    assert np.ptp(inputs) <= 2
