@@ -35,6 +35,7 @@ def test_every_verdict_and_every_answer_of_the_first_edition_has_a_line():
         assert {(group, name) for name in one.asked} <= names
 
 
+@pytest.mark.slow
 def test_what_rests_on_rows_of_the_first_edition_alone_is_the_same_today(both):
     """A group is left out as soon as the manifest says that one of its parts was made anew."""
     old = [
@@ -50,6 +51,7 @@ def test_what_rests_on_rows_of_the_first_edition_alone_is_the_same_today(both):
             assert getattr(one.today, name) == known, one.name
 
 
+@pytest.mark.slow
 def test_every_line_has_a_group_and_is_counted_once(both):
     assert {*both.group} == {*editions.GROUPS}
     assert not both.duplicated(["group", "name"]).any()

@@ -32,10 +32,6 @@ def shown(study):
     return {one.title: one for one in gallery(study)}
 
 
-def test_there_are_six(shown):
-    assert tuple(shown) == TITLES
-
-
 @pytest.mark.parametrize("title", TITLES)
 def test_the_settings_are_json_and_name_the_run(shown, title):
     example = shown[title]
@@ -92,7 +88,3 @@ def test_one_learner_fails_where_the_other_does_not(shown, study, title):
     assert example.experiment.learner == wrong
     assert example.against == other
     assert wrong in example.sentence
-
-
-def test_without_a_study_there_are_the_two_that_are_made():
-    assert [one.title for one in gallery(published.Published())] == ["A kink", "A tie"]

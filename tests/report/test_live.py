@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from builders import raising
 
-from nmpcrl.control import Nmpc
 from nmpcrl.control import browser as alone
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
 from nmpcrl.report.live import closed_loop, frame
-from nmpcrl.report.live.problem import problem_of
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import MOST_OBSTACLES
 
@@ -60,19 +58,6 @@ def test_the_problem_is_the_one_that_the_controller_solves(nmpc, data):
     assert shown["most_discs"] == MOST_OBSTACLES
 
 
-def test_a_start_on_a_boundary_counts_as_with_the_controller(nmpc):
-    for active in (False, True):
-        here = Nmpc(nmpc.plant, nmpc.task, horizon=7, ties_active=active)
-        assert problem_of(here)["tie"] == here.ocp.tie
-    assert problem_of(here)["tie"] != problem_of(nmpc)["tie"]
-
-
-def test_it_begins_with_the_chapters_parameters(nmpc, data):
-    assert data["start"] == nmpc.task.start.tolist()
-    assert data["theta"] == list(paper.THETA_INIT)
-    assert data["horizon"] == 7
-
-
 def test_each_slider_has_a_step_at_its_first_value(data):
     first = dict(zip(data["names"], data["theta"], strict=True)) | {"horizon": data["horizon"]}
     assert set(data["ranges"]) == set(first)
@@ -104,10 +89,6 @@ def test_the_output_is_whole_and_loads_nothing(shown):
     assert gzip.decompress(packed) == b"abc"
 
 
-def test_without_scripts_it_is_hidden_and_a_notebook_that_shows_it_says_why(shown):
-    assert re.match(r'<figure class="live" data-figure="controller" hidden>\n<p>.* trusted', shown)
-
-
 def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
     monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
     assert live.controller(nmpc, THETA, 130).data == (
@@ -118,35 +99,9 @@ def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
 SLIDING = np.array([4.4, 1.9, 0.1])  # near obstacle 3 of layout C, not on it
 
 
-def test_the_gradient_begins_in_the_middle_of_its_steps(nmpc, small):
-    data = given(live.gradient(nmpc, SLIDING, THETA, np.array([1e-6, 1e-4, 1e-2])).data)
-    assert data["steps"][data["step"]] == 1e-4
-    assert data["start"] == SLIDING.tolist()
-
-
 def test_the_kinks_boundaries_are_where_the_slack_begins(nmpc, small):
     data = given(live.kink(nmpc, SLIDING, THETA).data)
     x, y, _ = nmpc.task.discs
     for k, radius in enumerate(data["boundaries"]):
         on_it = np.array([x[k] + radius * np.cos(1.0), y[k] + radius * np.sin(1.0), 0.0])
         assert nmpc.task.overlap(on_it)[k] == pytest.approx(-THETA[8])
-
-
-def test_the_kinks_map_shows_the_nearest_obstacle_whole(nmpc, small):
-    x, y, width, height = given(live.kink(nmpc, SLIDING, THETA).data)["view"]
-    k = np.argmax(nmpc.task.overlap(SLIDING))
-    centre_x, centre_y, clearance = (each[k] for each in nmpc.task.discs)
-    assert x < centre_x - clearance / 2 < centre_x + clearance / 2 < x + width
-    assert y < centre_y - clearance / 2 < centre_y + clearance / 2 < y + height
-
-
-def test_the_update_is_given_the_chapters_alpha_and_discount(nmpc, small):
-    data = given(live.update(nmpc, THETA, 3e-7).data)
-    assert [data["alpha"], data["gamma"], data["overshoot"]] == [3e-7, nmpc.gamma, 2]
-
-
-def test_without_its_scripts_there_is_a_sentence(nmpc, tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_LIVE", str(tmp_path / "nowhere"))
-    shown = live.controller(nmpc, THETA, 130).data
-    assert shown.startswith("<p>There is no live figure here: its scripts are not in ")
-    assert "NMPCRL_LIVE" in shown

@@ -1,15 +1,10 @@
 """What the introduction's live figure is given: the study's own run, and two of its layouts."""
 
-import re
-
-import numpy as np
 import pytest
-from builders import raising
 
-from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.live import frame, introduction
+from nmpcrl.report.live import introduction
 from nmpcrl.study import Experiment, layouts, paper
 
 
@@ -34,23 +29,3 @@ def test_one_layout_is_open_and_the_other_closing(data):
         assert centres == [list(one) for one in paper.LAYOUTS[name]]
     assert layouts.screen(paper.LAYOUTS[introduction.WIDE]).kind == "open"
     assert layouts.screen(paper.LAYOUTS[introduction.NARROW]).kind == "closing"
-
-
-def test_the_map_shows_both_layouts_whole(data):
-    left, bottom, width, height = data["view"]
-    for x, y, clearance in np.concatenate(list(data["layouts"].values())):
-        assert left <= x - clearance / 2
-        assert x + clearance / 2 <= left + width
-        assert bottom <= y - clearance / 2 + 1e-9
-        assert y + clearance / 2 <= bottom + height + 1e-9
-
-
-def test_all_its_files_are_there_once(shown):
-    names = re.findall(r'data-file="([^"]+)"', shown)
-    scripts = introduction.SCRIPTS
-    assert names == [frame.STYLE, *introduction.STYLES, frame.MODULE, *scripts]
-
-
-def test_without_a_compiler_there_is_a_sentence(monkeypatch):
-    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
-    assert "There is no live figure here" in live.intro().data

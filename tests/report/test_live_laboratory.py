@@ -1,19 +1,15 @@
 """What the laboratory is given: the library's own settings, looks and noise."""
 
 import json
-import re
 
 import numpy as np
 import pytest
-from builders import raising
 
 from nmpcrl.analysis.trajectory import closes_at
-from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
 from nmpcrl.report.examples import Example, first_rollout
-from nmpcrl.report.live import frame, noise, training
-from nmpcrl.report.live.looks import look
+from nmpcrl.report.live import noise, training
 from nmpcrl.study import Experiment, ParameterError, paper
 
 FIND = Example("One", "See.", {}, Experiment(seed=3), "Look.")
@@ -52,18 +48,6 @@ def test_whatever_it_allows_an_experiment_takes(data):
                 Experiment(**{name: kind(field["most"]) * 2})
 
 
-def test_a_setting_is_shown_for_the_learners_that_read_it(data):
-    read_by = {field["name"]: field["read_by"] for field in data["fields"]}
-    assert read_by["alpha"] == ["ES", "DES", "RDES", "GES", "TDC", "QL"]
-    assert read_by["zeta"] == ["DES", "RDES"]
-    assert (read_by["beta"], read_by["beta_tdc"]) == (["GES"], ["TDC"])
-    assert read_by["seed"] == list(training.LEARNERS)
-
-
-def test_learners_have_their_colours(data):
-    assert data["looks"] == {learner: look(learner) for learner in training.LEARNERS}
-
-
 def test_the_longest_horizon_has_a_discount_for_every_stage(data):
     most = next(field["most"] for field in data["fields"] if field["name"] == "horizon")
     discount = data["problem"]["discount"]
@@ -82,14 +66,6 @@ def test_the_widths_of_the_strips_make_numpys_normal_numbers(data):
         assert drawn == (1 - 2 * int(negative)) * place * widths[strip]
 
 
-def test_a_find_is_a_title_a_sentence_and_settings(data):
-    (find,) = data["gallery"]
-    assert (find["title"], find["sentence"], find["settings"]["seed"]) == ("One", "See.", 3)
-    assert (find["look"], find["against"], find["learned"]) == ("Look.", None, True)
-    names = {field["name"] for field in data["fields"]}
-    assert set(find["settings"]) == names | {"layout", "start", "target", "theta"}
-
-
 def test_the_lesson_sets_theta_c_to_either_side_of_where_the_gap_closes(data):
     runs = [Experiment(**step["settings"]) for step in data["trap"]]
     over = [step["against"] and Experiment(**step["against"]) for step in data["trap"]]
@@ -105,19 +81,3 @@ def test_the_lesson_sets_theta_c_to_either_side_of_where_the_gap_closes(data):
     assert (again, exact.learner, slower.alpha) == (learned, "TDC", learned.alpha / 10)
     for one in runs:
         assert (one.layout, one.start, one.seed) == (learned.layout, learned.start, learned.seed)
-
-
-def test_all_its_files_are_there_once(shown):
-    names = re.findall(r'data-file="([^"]+)"', shown)
-    assert names == [
-        frame.STYLE,
-        *training.STYLES,
-        frame.MODULE,
-        *training.SCRIPTS,
-    ]
-    assert re.findall(r'<(\w+) data-file="[\w.]+css"', shown) == ["style", "style"]
-
-
-def test_without_a_compiler_there_is_a_sentence(monkeypatch):
-    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
-    assert "There is no live figure here" in live.laboratory().data

@@ -6,18 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import raising
 
 from nmpcrl.analysis import two_state
-from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.nmpc import ABSURD, FAR
 from nmpcrl.learning import browser, training
 from nmpcrl.report import live
-from nmpcrl.report.figures.style import LOOKS
-from nmpcrl.report.live import frame, two_learners, two_states
-from nmpcrl.report.live.looks import look
+from nmpcrl.report.live import two_learners, two_states
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.geometry import MOST_OBSTACLES
 from nmpcrl.study.setup import prepare
 
 EXPERIMENT = Experiment(layout="C", alpha=3e-8, decay="episode", seed=4, episodes=20, horizon=7)
@@ -38,21 +33,6 @@ def data_of(figure: str) -> dict:
     return json.loads(re.search(r'application/json">(.*)</script>', html)[1])
 
 
-@pytest.mark.parametrize("figure", FIGURES)
-def test_the_output_is_whole_and_loads_nothing(figure):
-    make, scripts = FIGURES[figure]
-    html = make().data
-    assert re.findall(r'data-file="([^"]+)"', html) == ["live.css", "module.js", *scripts]
-    assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", html)
-
-
-@pytest.mark.parametrize("figure", FIGURES)
-def test_without_a_compiler_there_is_a_sentence(figure, monkeypatch):
-    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
-    said = "<p>There is no live figure here: numba is not installed.</p>"
-    assert FIGURES[figure][0]().data == said
-
-
 def test_the_chain_is_that_of_the_analysis():
     data = data_of("chain")
     chain = two_state.Chain(gamma=0.97)
@@ -60,14 +40,6 @@ def test_the_chain_is_that_of_the_analysis():
         phi, phi_next = data["phi"][state][0], data["phi_next"][state][0]
         delta = data["cost"] + 0.97 * phi_next * data["theta"] - phi * data["theta"]
         assert delta == pytest.approx(chain.delta(np.array([data["theta"]]), state))
-
-
-def test_each_slider_of_the_chain_has_a_step_at_its_first_value():
-    data = data_of("chain")
-    for name, (least, most, step) in data["ranges"].items():
-        assert least < data["given"][name] <= most
-        steps = (data["given"][name] - least) / step
-        assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
 @pytest.mark.parametrize("figure", ["learners", "networks"])
@@ -93,17 +65,6 @@ def test_both_learners_begin_as_the_experiment_does(figure):
         assert settings["network"] == {"hidden": paper.HIDDEN, "batch": paper.BATCH}
 
 
-def test_no_script_holds_a_number_of_the_library():
-    """They are data, so that a change in Python is one in the page."""
-    numbers = (ABSURD, training.PATIENCE, paper.HIDDEN, paper.BATCH, MOST_OBSTACLES)
-    texts = {path.name: path.read_text() for path in frame.folder().glob("*.js")}
-    for name in ("learning.js", "network.js", "solver.js"):
-        found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e\d+)?\b", texts[name])
-        assert not set(map(float, found)) & set(map(float, numbers)), name
-    for name, text in texts.items():
-        assert not re.search(r"\b(ABSURD|PATIENCE|HIDDEN|BATCH)\b", text), name
-
-
 def test_networks_are_fitted_for_sixty_episodes_at_most(monkeypatch):
     for asked, shown in ((300, 60), (12, 12)):
         monkeypatch.setitem(globals(), "EXPERIMENT", replace(EXPERIMENT, episodes=asked))
@@ -117,17 +78,3 @@ def test_a_network_that_a_page_does_not_have_is_refused(changes):
     ((name, value),) = changes.items()
     with pytest.raises(ValueError, match=re.escape(f"{name} = {value!r}")):
         live.networks(replace(EXPERIMENT, learner="RDES", **changes))
-
-
-@pytest.mark.parametrize("alpha", [1e-7, 3e-9, 2.5e-6])
-def test_alphas_slider_has_a_step_at_the_chapters_alpha(alpha):
-    least, most, step = two_learners.around(alpha)
-    assert 10 ** (least + 10 * step) == pytest.approx(alpha, rel=1e-5)
-    assert most - least == pytest.approx(20 * step)
-
-
-@pytest.mark.parametrize("learner", LOOKS)
-def test_a_learner_looks_as_in_every_figure(learner):
-    found, known = look(learner), LOOKS[learner]
-    assert found["color"] in (known.color, "var(--ink)")
-    assert bool(found["dashes"]) == (known.linestyle != "-")

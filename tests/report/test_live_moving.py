@@ -1,7 +1,5 @@
 """The figure of moving obstacles: what it is given, and that its modules drive as Python does."""
 
-import re
-
 import numpy as np
 import pytest
 from wasm_host import Controller, Module
@@ -10,7 +8,7 @@ from nmpcrl.analysis.encounters import count, judged
 from nmpcrl.control import Nmpc
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.live import frame, moving_obstacles
+from nmpcrl.report.live import moving_obstacles
 from nmpcrl.report.live.moving_obstacles import SCENE
 from nmpcrl.study import moving, paper
 from nmpcrl.study.moving import PREDICTORS, Straight, centres
@@ -24,14 +22,6 @@ def shown() -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(browser, "module", lambda *of: b"abc" if len(of) == 2 else b"def")
         return live.moving().data
-
-
-def test_its_files_are_those_of_a_figure_that_solves_and_a_second_module(shown):
-    modules = [frame.MODULE, frame.PROBLEM]
-    names = re.findall(r'data-file="([^"]+)"', shown)
-    styles = [frame.STYLE, *moving_obstacles.STYLES]
-    assert names == [*styles, *modules, *moving_obstacles.SCRIPTS]
-    assert "{ ...window.nmpcrl, problem_module: " in shown
 
 
 def test_it_is_given_the_studys_episode_and_clearance(data):

@@ -1,43 +1,27 @@
 """Numbers in prose, the braces of LaTeX, and source that is shown from the library."""
 
-import ast
 import inspect
 import re
-import textwrap
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.learning import updates
-from nmpcrl.learning.learners import Learner
 from nmpcrl.report import prose
 from nmpcrl.report.cited import Count, by_reading
 from nmpcrl.report.prose import (
-    PLACEHOLDER,
     filled,
-    folded,
     held,
     listing,
     say,
-    scientific,
     share,
     source,
 )
 
-LATEX = (
-    r"$\mathbf{s}$, $\boldsymbol{\theta}_{init}$, $\frac{a}{b}$, $x^{ref}$, $\sqrt[3]{x}$,"
-    r" $\{x\}$, $\text{init}$, $\lVert x \rVert_{Q}^{2}$, $\theta_{x_f}$, $\begin{aligned}$"
-)
 WORDS = st.text("abc XYZ.,;:$=-+*|\\^_", max_size=12)
-
-
-def test_a_number_is_written_as_its_placeholder_says():
-    assert filled("{n} runs cost {cost:.2f}, {share:+.1%}", n=3, cost=2.0, share=0.1) == (
-        "3 runs cost 2.00, +10.0%"
-    )
 
 
 def test_the_cost_of_a_run_that_failed_is_written_as_infinite():
@@ -81,34 +65,10 @@ def test_an_expectation_held_by_the_rule_for_claims(yes, of, said):
     assert held(yes, of) == said
 
 
-def test_the_braces_of_latex_are_no_placeholders():
-    assert filled(LATEX) == LATEX
-
-
 @given(before=WORDS, after=WORDS, number=st.floats(allow_nan=False, allow_infinity=False))
 def test_what_stands_around_a_number_is_kept(before, after, number):
     template = f"a{before} {{number:.3e}}{after}z"
     assert filled(template, number=number) == f"a{before} {number:.3e}{after}z"
-
-
-@given(number=st.floats(-1e9, 1e9))
-def test_a_number_may_stand_in_a_formula(number):
-    assert (
-        filled(r"$\delta = {d:.2f}\,\text{m}$", d=number) == rf"$\delta = {number:.2f}\,\text{{m}}$"
-    )
-
-
-@given(names=st.lists(st.from_regex(r"[a-z]\w{0,5}", fullmatch=True), unique=True, max_size=5))
-def test_every_placeholder_gets_its_own_number(names):
-    numbers = {name: index for index, name in enumerate(names)}
-    text = filled(" ".join(f"{{{name}}}" for name in names), **numbers)
-    assert text.split() == [str(index) for index in range(len(names))]
-
-
-@given(text=st.text("{}a:\\ $", max_size=20))
-def test_a_template_without_a_placeholder_stays_as_it_is(text):
-    assume(not PLACEHOLDER.search(text))
-    assert filled(text) == inspect.cleandoc(text)
 
 
 def test_a_placeholder_without_a_number_is_refused_by_name():
@@ -119,10 +79,6 @@ def test_a_placeholder_without_a_number_is_refused_by_name():
 def test_a_number_without_a_placeholder_is_refused_by_name():
     with pytest.raises(NameError, match=r"cost is given, and there is no \{cost\} in: it costs"):
         filled("it costs nothing", cost=3.0)
-
-
-def test_a_template_may_be_indented_as_code_is():
-    assert filled("\n    - one\n      line\n    - {n}\n    ", n=2) == "- one\n  line\n- 2"
 
 
 @pytest.fixture
@@ -139,24 +95,10 @@ def shown(monkeypatch):
     return call
 
 
-def test_say_displays_markdown(shown):
-    assert shown(say, "It costs {cost:.1f}.", cost=2.0) == "It costs 2.0."
-
-
 def test_source_displays_the_file_and_the_very_text_of_the_library(shown):
     text = shown(source, updates.td_error)
     assert text.startswith("`nmpcrl/learning/updates.py`\n\n```python\ndef td_error(")
     assert inspect.getsource(updates.td_error).strip() in text
-
-
-def test_a_method_is_shown_without_its_indentation():
-    code = listing(Learner.step).partition("```python\n")[2].removesuffix("\n```")
-    assert code == textwrap.dedent(inspect.getsource(Learner.step)).rstrip()
-    assert isinstance(ast.parse(code).body[0], ast.FunctionDef)
-
-
-def test_a_class_is_shown_with_its_decorator():
-    assert "```python\n@dataclass(frozen=True)\nclass Learner:" in listing(Learner)
 
 
 def test_what_only_exists_compiled_and_a_constant_are_shown_by_name():
@@ -167,21 +109,6 @@ def test_what_only_exists_compiled_and_a_constant_are_shown_by_name():
 def test_a_name_that_is_not_defined_is_refused():
     with pytest.raises(NameError, match="center"):
         listing("nmpcrl.control.solvers.kernel:center")
-
-
-def test_source_with_a_title_is_folded_behind_it(shown):
-    assert shown(source, updates.td_error, "the error") == folded(
-        listing(updates.td_error), "the error"
-    )
-
-
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [(1e-7, "10^{-7}"), (3e-7, r"3 \cdot 10^{-7}"), (1.5e-7, r"1.5 \cdot 10^{-7}")],
-)
-def test_a_small_number_stands_in_a_formula_as_a_power_of_ten(value, shown):
-    assert scientific(value) == shown
-    assert filled(r"$\alpha = {alpha}$", alpha=scientific(value)) == rf"$\alpha = {shown}$"
 
 
 def test_a_number_with_an_origin_carries_its_value_and_what_it_is_of():
@@ -195,12 +122,6 @@ def test_a_number_with_an_origin_carries_its_value_and_what_it_is_of():
 def test_an_estimate_carries_its_interval():
     shown = filled("{rate:.2f}", origin="us", rate=Estimate(0.5, 0.25, 0.75))
     assert shown.startswith('<data value="0.5 [0.25, 0.75]" title="rate: us">0.50 [')
-
-
-def test_words_formulas_and_code_stay_as_they_are():
-    said = filled("{a} $x = {b}$ `{c}` {d:g}", origin="us", a="one", b=1, c=2, d=3)
-    assert said == 'one $x = 1$ `2` <data value="3.0" title="d: us">3</data>'
-    assert filled("{a} {b}", a=1, b=2) == "1 2"
 
 
 def test_a_median_is_said_for_each_reading_of_the_decay_and_never_for_both():

@@ -10,14 +10,11 @@ from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.report import remedies
 from nmpcrl.report.remedies import (
-    COLOURS,
     advice_table,
     answer_items,
     in_short,
-    rule,
 )
 from nmpcrl.studies.remedies import (
-    ADVICE,
     ADVISED,
     FIRST,
     LATER,
@@ -26,7 +23,6 @@ from nmpcrl.studies.remedies import (
     PARTS,
     REMEDIES,
     SECOND,
-    SETTINGS,
     RemedyRow,
 )
 from nmpcrl.studies.worlds import WORLDS
@@ -103,13 +99,6 @@ def test_a_table_of_a_part_has_each_layout_and_the_greatest_share_first(runs):
     assert said == "<p>Nothing is published yet of the part <em>named 300</em>.</p>"
 
 
-def test_every_entry_and_every_word_is_described():
-    assert [*remedies.WHAT] == [*SETTINGS]
-    assert remedies.entry_table().count("\n| `") == len(SETTINGS)
-    assert {*COLOURS} == {*ADVICE}
-    assert rule().count("\n") == len(ADVICE) - 1
-
-
 def test_the_advice_in_short_names_first_second_and_never_with_evidence(advised):
     sometimes = advised[advised.word != LATER]
     said = BeautifulSoup(in_short(sometimes), "html.parser").get_text()
@@ -155,10 +144,3 @@ def test_an_answer_comes_with_its_pilot_its_evidence_and_another_expectation(
 ):
     line = answer_items([answer], {**WORLDS.asked, **REMEDIES.asked}, expected=expected)
     assert line.endswith(said)
-
-
-def test_an_expectation_says_whether_it_came_true():
-    items = remedies.expectation_items({"DPG is never advised": True, "ES is first": False})
-    assert items == (
-        "- Expected: DPG is never advised. So it is.\n- Expected: ES is first. It is not so."
-    )

@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import published
-from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.robustness import COLUMNS
 from nmpcrl.claims.verdict import (
     NOT,
@@ -18,8 +17,6 @@ from nmpcrl.claims.verdict import (
 )
 from nmpcrl.report import text
 from nmpcrl.study.design import VARIANTS
-
-OWN = "evidence.ipynb#evidence-own"
 
 
 def verdict(claim: str, outcome: str, layouts: str = "", decays: str = "") -> Verdict:
@@ -81,26 +78,6 @@ def test_a_claim_that_turns_round_with_the_reading_of_the_decay_depends_on_it():
         assert text.depends_on([one], table()) == {}
 
 
-def test_claims_of_our_own_are_confirmed_or_not_and_never_called_reproduced():
-    judged = [
-        replace(verdict(name, outcome), said=OWN_CLAIMS[name].words.get(outcome, ""))
-        for name, outcome in (("B1", NOT), ("B2", PARTLY), ("B3", REPRODUCED), ("B4", UNDECIDABLE))
-    ]
-    assert text.outcomes(judged).splitlines() == [
-        f"- [B1]({OWN}). It is so. *Not confirmed.*",
-        f"- [B2]({OWN}). It is so. *Confirmed in part.*",
-        f"- [B3]({OWN}). It is so. *Confirmed.*",
-        f"- [B4]({OWN}). It is so. *Not decidable here.*",
-    ]
-
-
-def test_a_verdict_leads_to_what_it_rests_on_a_wider_one_to_that_of_the_papers_claim():
-    first, wider = verdict("C1", NOT), verdict("W7", PARTLY)
-    link = "[C1](evidence.ipynb#evidence-c1)"
-    assert text.judged(first) == f"{link} (*It is so*): **not reproduced**."
-    assert text.audit_link(wider.claim) == "[W7](evidence.ipynb#evidence-c7)"
-
-
 def test_a_departure_counts_every_variant_that_reads_it_otherwise():
     assert (VARIANTS["tanh"].departure, VARIANTS["four fits"].departure) == ("H", "H")
     assert VARIANTS["alpha x 3"].departure == ""
@@ -115,11 +92,3 @@ def test_a_departure_counts_every_variant_that_reads_it_otherwise():
         "B": ("C2",),
         "H": ("C1", "C6"),
     }
-
-
-@pytest.mark.parametrize(
-    ("names", "said"),
-    [((), "none"), (("a",), "a"), (("a", "b"), "a and b"), ((1, 2, 3), "1, 2 and 3")],
-)
-def test_names_are_listed_as_a_sentence_has_them(names, said):
-    assert text.listed(names) == said

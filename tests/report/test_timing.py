@@ -1,6 +1,5 @@
 """Sentences on times."""
 
-import pandas as pd
 import pytest
 
 from nmpcrl.report import timing
@@ -11,14 +10,6 @@ def test_slow_solves_give_one_half_only_where_all_take_alike(timings):
     said = timing.at_paper_speed(timings)
     assert said.startswith("With solves of 0.83 s, the paper's, a step of RDES would take 0.63 of")
     assert said.endswith("and 0.50 if all solves took alike (C3).")
-
-
-def test_the_coverage_is_that_of_the_worst_and_of_all():
-    rows = [("ES", 10, 10), ("GES", 10, 9), ("RDES", 10, 10)]
-    said = timing.coverage(pd.DataFrame(rows, columns=["learner", "repetitions", "inside"]))
-    assert "repeated 10 times" in said
-    assert "at least 9 of 10 contain" in said
-    assert "95% over all" in said
 
 
 def test_a_ratio_has_its_interval_and_carries_what_it_is_of(timings):

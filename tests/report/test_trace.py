@@ -6,7 +6,7 @@ from small_problems import pendulum
 
 from nmpcrl.control import Nmpc, Riccati
 from nmpcrl.control.solvers import TOLERANCE
-from nmpcrl.report.trace import interpreted, trace
+from nmpcrl.report.trace import trace
 from nmpcrl.study import paper
 from nmpcrl.study.problems import gros_zanon
 
@@ -55,28 +55,12 @@ def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance(co
     assert cold.delta.iloc[-2] == 0
 
 
-def test_a_warm_start_begins_with_a_smaller_mu_and_takes_fewer_iterations(nmpc, theta, cold):
-    first = nmpc.solve(BUSY, theta)
-    shifted = trace(nmpc.ocp, nmpc.plant.step(BUSY, first.action), theta, first)
-    same = trace(nmpc.ocp, BUSY, theta + 1e-4, first)
-    assert cold.mu[0] > shifted.mu[0] > same.mu[0]
-    assert len(cold) > len(shifted) > len(same)
-
-
 def test_gauss_newton_needs_no_delta_and_more_iterations(nmpc, theta, cold):
     straight = trace(nmpc.ocp, BUSY, theta, curvature=False)
     assert straight.delta.max() == 0
     assert len(straight) > 3 * len(cold)
     if straight.error.iloc[-1] <= TOLERANCE:
         assert straight.value.iloc[-1] == pytest.approx(cold.value.iloc[-1], rel=1e-6)
-
-
-def test_a_function_that_is_replaced_is_called_by_the_others_of_its_copy_only(nmpc):
-    plain, other = interpreted(nmpc.problem), interpreted(nmpc.problem)
-    plain.input_gradient = lambda *_: 9.0
-    assert plain.residuals.__globals__["input_gradient"]() == 9.0
-    assert other.residuals.__globals__["input_gradient"] is other.input_gradient
-    assert other.input_gradient is not plain.input_gradient
 
 
 @pytest.mark.slow

@@ -1,7 +1,6 @@
 """A figure has at most two panels beside each other, is read in words, and can be seen."""
 
 import ast
-from base64 import b64decode
 from io import BytesIO
 from pathlib import Path
 
@@ -9,12 +8,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from legibility import CONTRAST, contrast, flaws
-from matplotlib.colors import to_rgb
 
 from nmpcrl.report.figures import sheet, style
 from nmpcrl.report.figures.axes import below, draw_task
 from nmpcrl.report.figures.runs import perturbed
-from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.study import Experiment, paper
 
 START = 1e-12
@@ -143,13 +140,6 @@ def test_a_title_is_read_in_words(title, words):
     assert sheet.in_words(title) == words
 
 
-def test_without_a_title_of_its_own_a_figure_finds_what_its_panels_do():
-    figure, (left, right) = sheet.subplots(1, 2)
-    left.set_title("It falls", loc="left")
-    right.set_title("it rises", loc="left")
-    assert figure.finding == "It falls; it rises"
-
-
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_the_same_figure_gives_the_same_bytes(kind):
     assert bars().written(kind) == bars().written(kind)
@@ -172,13 +162,6 @@ def test_a_notebook_is_shown_one_picture_and_its_finding(monkeypatch):
     assert bundle["image/svg+xml"].encode() == bars().written("svg")
 
 
-def test_what_would_be_a_heavy_svg_is_a_png(monkeypatch):
-    monkeypatch.setattr(sheet, "HEAVY", 1000)
-    bundle = shown(bars(), monkeypatch)
-    assert set(bundle) == {"text/plain", "image/png"}
-    assert b64decode(bundle["image/png"]).startswith(b"\x89PNG")
-
-
 # What can be seen
 
 
@@ -187,58 +170,6 @@ def test_a_learner_s_line_can_be_seen_on_white(name):
     assert contrast(style.LOOKS[name].color) >= CONTRAST
 
 
-@pytest.mark.parametrize("count", [1, 4, 9])
-def test_colours_in_an_order_can_all_be_seen(count):
-    shades = [contrast(color) for color in style.shades(count)]
-    assert min(shades) >= CONTRAST
-    assert shades == sorted(shades, reverse=True)
-    assert min(np.ptp(to_rgb(color)) for color in style.shades(count)) > 0.3  # none is a grey
-
-
 def test_learners_are_told_apart_without_colour():
     for part in ("linestyle", "marker"):
         assert len({str(getattr(look, part)) for look in style.LOOKS.values()}) == len(style.LOOKS)
-
-
-def test_no_colour_with_its_hatching_means_two_things():
-    parts = [*style.STEP_PARTS.values(), *(one for kind in failure_modes.PATTERNS for one in kind)]
-    assert len(set(parts)) == len(parts)
-    learners = {look.color for look in style.LOOKS.values()}
-    assert not learners & {color for color, _ in parts}
-
-
-def test_contrast_is_that_of_wcag():
-    assert contrast("black") == pytest.approx(21)
-    assert contrast("white") == pytest.approx(1)
-    assert contrast("#767676") == pytest.approx(4.54, abs=0.01)
-    assert contrast("black", 0.5) == pytest.approx(contrast("0.5"))
-
-
-# The looking itself
-
-
-def test_what_cannot_be_read_is_found():
-    figure, axes = sheet.subplots()
-    style.headed(figure, "A figure")
-    axes.plot([0, 1], color="#dddddd")
-    axes.text(0.5, 0.5, "tiny", fontsize=4)
-    axes.text(0.1, 0.1, "one label")
-    axes.text(0.1, 0.1, "another label")
-    axes.text(5.0, 0.2, "far away").set_in_layout(False)
-    axes.set(xlim=(0, 1), ylim=(0, 1), xlabel="episode")
-    axes.set_xticks([0, 0.5])
-    found = " / ".join(flaws(figure))
-    assert "'tiny' is small" in found
-    assert "'one label' lies on 'another label'" in found
-    assert "'far away' leaves the canvas" in found
-    assert "#dddddd is pale" in found
-    assert "episode 0.5 is none" in found
-    assert found.count("/") == 4
-
-
-def test_single_runs_may_be_faint_behind_their_median():
-    figure, axes = sheet.subplots()
-    axes.plot(np.ones((2, 3)), color="#0072B2", alpha=0.3)
-    assert flaws(figure)
-    axes.plot([1, 2], color="#0072B2")
-    assert not flaws(figure)

@@ -33,10 +33,6 @@ def test_the_sparsity_title_says_how_narrow_the_band_is(assert_readable, texts):
     assert (square.get_xy(), square.get_width()) == ((2.5, 2.5), 2)
 
 
-def test_the_bandwidth_of_nothing_is_zero():
-    assert draw.bandwidth(np.zeros((3, 3))) == 0
-
-
 def test_the_starts_are_distinct_and_counted(assert_readable, texts):
     traces = {
         "cold": iterates(10, 1, 0.1, 1e-9),

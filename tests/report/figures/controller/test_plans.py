@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.report.figures.controller import plans as draw
@@ -65,11 +64,6 @@ def test_the_closed_loop_is_drawn_with_its_plans_and_its_length(
     figure = draw.closed_loop(nmpc.task, rollout, [plan])
     assert_readable(figure)
     assert "at most 1.2 m make a trajectory of 0.5 m" in texts(figure)
-
-
-def test_every_obstacle_has_its_disc_and_its_circle(nmpc, rollout):
-    figure = draw.closed_loop(nmpc.task, rollout, [])
-    assert sorted(patch.radius for patch in figure.axes[0].patches) == [1.0] * 4 + [1.25] * 4
 
 
 def test_the_plan_that_ends_farthest_from_the_closed_loop_is_drawn_and_named(
@@ -189,8 +183,3 @@ def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study(assert_re
     small = Runs({run: records(run, 0.0) for run in runs})
     for figure in (expected_sarsa.theta_paths, expected_sarsa.overshoot, expected_sarsa.two_costs):
         assert_readable(figure(small))
-
-
-def test_a_figure_is_closed_so_that_a_notebook_shows_it_once(nmpc, rollout):
-    draw.closed_loop(nmpc.task, rollout, [])
-    assert pyplot.get_fignums() == []

@@ -49,10 +49,6 @@ def test_a_w_that_is_lost_is_named_with_its_episode():
     assert drawn == pytest.approx([4.0, 1.9])
 
 
-def test_a_w_that_keeps_is_named_too():
-    assert title(tdc.step_of_w({1e-7: run(TDC)})) == r"$\beta\,\|\phi\|^2$ stays below 2"
-
-
 def test_the_part_that_moves_the_end_of_tdc_most_is_in_the_title():
     ends = {"TDC": 0.96, "without h": 0.92, "not projected": 0.97, "slow w": 0.95, "GES": 0.5}
     figure = tdc.parts_of_tdc({name: run(TDC, cost=cost) for name, cost in ends.items()})
@@ -60,8 +56,3 @@ def test_the_part_that_moves_the_end_of_tdc_most_is_in_the_title():
     assert set(ends) == set(tdc.PARTS)
     for axes in figure.axes:
         assert len(axes.get_lines()) == len(ends)
-
-
-def test_the_lines_of_the_parts_are_distinct_in_grey():
-    styles = [str(look["linestyle"]) for look in tdc.PARTS.values()]
-    assert len(set(styles)) == len(styles)

@@ -45,11 +45,3 @@ def test_what_is_not_known_has_no_mark_and_what_is_beyond_lies_at_the_edge():
     figure = drawn(values)
     assert len(marks(figure, "ES")) == len(es) - 3
     assert {marks(figure, "GES").min(), marks(figure, "GES").max()} == {-0.1, 0.2}
-
-
-def test_a_learner_that_was_not_run_leaves_its_place_empty():
-    kept = RUNS[RUNS.learner != "GES"].reset_index(drop=True)
-    values = pd.Series(0.1, kept.index)
-    seen = {"seen": (0, 1), "label": "gain", "finding": "", "mark": ""}
-    figure = comparison.by_layout(kept, values, ("ES", "GES"), **seen)
-    assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["ES", "GES"]

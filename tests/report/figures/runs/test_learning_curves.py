@@ -2,14 +2,12 @@
 
 import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from nmpcrl.report.figures import panels
 from nmpcrl.report.figures.runs import learning_curves, rollouts
-from nmpcrl.study import Experiment, paper
+from nmpcrl.study import Experiment
 
 SEEDS = 4
 FAST = np.ones((5, 2))  # 1 m/s, and the robot's bound is 0.6
@@ -17,16 +15,6 @@ FAST = np.ones((5, 2))  # 1 m/s, and the robot's bound is 0.6
 
 def title(figure: Figure) -> str:
     return figure.get_suptitle()
-
-
-def heads(figure: Figure) -> list[str]:
-    """What stands above the panels."""
-    return [title for axis in figure.axes if (title := axis.get_title(loc="left"))]
-
-
-def thin(axis) -> list:
-    """The lines of single runs."""
-    return [line for line in axis.get_lines() if line.get_linewidth() == 0.5]
 
 
 def thick(axis) -> list:
@@ -67,15 +55,6 @@ def test_what_was_cut_short_or_never_reached_costs_infinitely_much(made_up):
     assert due[np.isinf(judged)].tolist() == list(range(110, 301, 10))
 
 
-def test_every_learner_of_figure_1_has_a_median_and_a_band_of_all_its_runs(made_up):
-    figure = learning_curves.figure_1(made_up(lambda e: {"end": 0.6 + 0.1 * e.seed}), "A")
-    for axis in figure.axes:
-        assert thin(axis) == []
-        assert len(thick(axis)) == 3  # DES, RDES and frozen
-    every = figure.axes[2].collections[0].get_paths()[0].vertices[:, 1]  # of DES, without noise
-    assert (every.min(), every.max()) == pytest.approx((0.6, 1.0))
-
-
 def test_figures_1_and_2_count_what_the_claims_count(made_up):
     found = made_up(des_fails)
     assert title(learning_curves.figure_1(found, "A")) == (
@@ -99,12 +78,6 @@ def test_nothing_leaves_its_panel_and_what_is_off_the_scale_is_in_a_strip(made_u
         assert max(map(max, others)) < learning_curves.CEILING < start
 
 
-def test_a_median_of_which_half_is_off_the_scale_is_off_it_too(made_up):
-    found = made_up(lambda e: {"reached": 100} if e.learner == "DES" and e.seed < 2 else {})
-    des, *_ = thick(learning_curves.figure_1(found, "A").axes[2])
-    assert des.get_ydata()[-1] == learning_curves.STRIP[1]
-
-
 def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     found = made_up(lambda e: {"end": 0.6 + 0.1 * e.seed}, seeds=(0, 1, 2, 3, 4))
     figure = learning_curves.figure_2(found, "A")
@@ -114,22 +87,7 @@ def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     assert thick(figure.axes[2])[0].get_ydata()[-1] == pytest.approx(0.8)
 
 
-def test_learners_that_were_not_run_are_counted_as_none(made_up):
-    found = made_up()
-    only = found.where(found.runs.learner.isin(("GES", "frozen")))
-    assert title(learning_curves.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
-
-
 # Rollouts
-
-
-def test_every_rollout_has_its_line_against_time(made_up):
-    figure = rollouts.controls(made_up(), "A")
-    assert {axis.get_xlabel() for axis in figure.axes} == {"", "time [s]"}
-    for axis in figure.axes:
-        assert len(thin(axis)) == 2 * 3 * SEEDS
-    labels = {axis.get_ylabel() for axis in figure.axes}
-    assert all("[" in label for label in labels if label)
 
 
 def test_inputs_that_leave_their_bounds_are_counted(made_up):
@@ -139,15 +97,6 @@ def test_inputs_that_leave_their_bounds_are_counted(made_up):
     )
     found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
     assert "; 10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
-
-
-def test_rollouts_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
-    published = {"actions": FAST[:0]}
-    found = made_up(lambda e: published if e.seed else {})
-    figure = rollouts.controls(found, "A")
-    assert all(len(thin(axis)) == 2 * 3 for axis in figure.axes)
-    nowhere = rollouts.controls(made_up(lambda e: published), "A")
-    assert title(nowhere) == "The inputs of no rollout are kept"
 
 
 def test_endings_are_counted_and_those_that_were_stopped_are_not_drawn(made_up):
@@ -165,50 +114,4 @@ def test_endings_are_counted_and_those_that_were_stopped_are_not_drawn(made_up):
     assert len(ends) == 2 * (3 * SEEDS - 1)
 
 
-def test_a_rollout_that_failed_is_drawn_as_far_as_it_got(made_up):
-    broken = made_up().summaries[Experiment("GES")].states.copy()
-    broken[3:] = np.nan
-    found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
-    figure = rollouts.maps(found)
-    assert "16 failed" in title(figure)
-    assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == 2 * SEEDS
-
-
-def test_every_layout_has_its_map(made_up):
-    figure = rollouts.maps(made_up(layouts=("A", "B", "D", "E"), seeds=(0,)))
-    assert heads(figure) == ["A", "B", "D", "E"]
-
-
 # All of them
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "draw",
-    [
-        learning_curves.figure_1,
-        learning_curves.figure_2,
-        rollouts.controls,
-        lambda found, _: rollouts.maps(found),
-    ],
-)
-def test_a_figure_says_where_its_runs_come_from_and_is_closed(draw, made_up, source_of):
-    found = made_up(source=lambda e: "fresh" if e.seed == 0 else "published", layouts=("A",))
-    mark = source_of(draw(found, "A"))
-    assert "6 runs trained for this page, 18 runs published" in mark
-    assert not plt.get_fignums()
-
-
-def test_a_part_has_the_learners_asked_for_and_one_layout_or_all(made_up):
-    found = made_up()
-    assert set(panels.part(found, ("ES", "GES")).runs.learner) == {"ES", "GES"}
-    assert panels.part(found, ("ES",)).summaries.values_of("layout") == ("A", "D")
-    assert panels.part(found, ("ES",), "D").summaries.values_of("layout") == ("D",)
-
-
-def test_the_target_of_the_drawn_rollout_is_the_task_s(made_up):
-    """What the tests above call arriving is arriving in every layout that they draw."""
-    states = made_up().summaries[Experiment("GES")].states
-    for name in ("A", "B", "D", "E"):
-        assert paper.task(name).distance(states[-1]) == 0
-        assert paper.task(name).overlap(states).max() < 0

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis.gradient_td import Curvature
-from nmpcrl.analysis.statistics import Estimate, rate
+from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims import thresholds
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.published import Evidence
@@ -119,13 +119,6 @@ def test_the_title_is_the_verdict_and_what_it_rests_on(claim, as_said):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("claim", ["C1", "C2", "C6", "C9"])
-def test_every_run_has_its_point(claim, as_said):
-    learners = 1 if claim == "C6" else 2
-    assert len(points(drawn(claim, as_said).axes[0])) == learners * CELLS
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, in_one_layout):
     found = in_one_layout
@@ -177,15 +170,6 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
     np.testing.assert_allclose(points(drawn("C5", found).axes[0]), [[1.0, 0.1]] * 8)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("stopped", [("RDES",), ("GES",), ("RDES", "GES")])
-def test_a_pair_of_which_a_run_was_stopped_is_not_in_the_box(stopped, made_up):
-    found = made_up(lambda e: {"reached": 40} if e.learner in stopped else {})
-    for axis in drawn("C5", found).axes[:-1]:
-        assert (points(axis)[:, 1] > thresholds.SAME_COST).all()
-    assert verdict(found, "C5").counts["all"] == (0, CELLS)
-
-
 def test_states_in_an_obstacle_are_counted_by_size(made_up):
     found = made_up(lambda e: {"inside": (3, 2, 1)} if e.learner == "GES" else {})
     training, judged, _ = drawn("C7", found).axes
@@ -194,47 +178,7 @@ def test_states_in_an_obstacle_are_counted_by_size(made_up):
     assert len(points(training)) == len(points(judged)) == 4 * 3 * CELLS
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("claim", RUN_CLAIMS)
-def test_runs_shorter_than_the_paper_s_can_be_drawn_and_decide_nothing(claim, made_up):
-    figure = drawn(claim, made_up(episodes=4, seeds=(0, 1)))
-    unit = RUN_CLAIMS[claim][1].split(" in 16 of 16 ")[-1].split(" in 32 of 32 ")[-1]
-    assert title(figure) == f"{claim} not decidable here: there are no {unit} to be asked"
-    assert not shares(figure.axes[-1])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("claim", RUN_CLAIMS)
-def test_a_claim_whose_learners_were_not_run_can_be_drawn(claim, made_up):
-    found = made_up(seeds=(0,))
-    only = found.where(found.runs.learner.isin(("TDC", "frozen")))
-    assert title(drawn(claim, only)).startswith(f"{claim} not decidable here")
-
-
-def test_a_figure_says_where_its_runs_come_from(made_up, source_of):
-    found = made_up(source=lambda e: "fresh" if e.layout == "A" else "published")
-    mark = source_of(drawn("C1", found))
-    assert mark == "16 runs trained for this page, 16 runs published"
-
-
 # All learners
-
-
-def test_a_learner_that_is_lowest_in_the_mean_alone_is_not_called_lowest_alone():
-    means = {"ES": Estimate(1.04, 1.0, 1.1), "TDC": Estimate(0.99, 0.98, 1.0)}
-    said = figures.lowest(means, {"ES": 0.97, "TDC": 0.992})
-    assert said == "TDC ends lowest by the interquartile mean, ES by the median"
-
-
-def test_the_learner_that_ends_lowest_is_named_with_what_it_is_lowest_by(made_up):
-    found = made_up(lambda e: {"end": 0.8 + 0.01 * e.seed if e.learner == "TDC" else 0.9})
-    figure = figures.learners(found)
-    assert title(figure) == "TDC ends lowest, by the interquartile mean and by the median"
-    assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == list(
-        found.runs.learner.unique()
-    )
-    means = found.runs.learner.nunique()
-    assert len(points(figure.axes[0])) == len(found.runs) + means
 
 
 def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stopped(made_up):
@@ -271,12 +215,6 @@ def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, claim,
     ends = [patch.get_x() + patch.get_width() for patch in figure.axes[0].patches[1:]]
     assert ends[-1] == pytest.approx(ratio)
     assert ends[2] == pytest.approx(1.0)
-
-
-def test_without_the_paper_s_solver_nothing_is_said_of_its_time():
-    fast = TIMES[TIMES.solver == "riccati"]
-    figure = figures.times(fast, CLAIMS["C3"].judge(Observations(timings=fast)), "RDES")
-    assert title(figure) == "C3 not decidable here: no time was taken with Ipopt"
 
 
 def test_the_correlation_of_td_errors_is_drawn_lag_by_lag():

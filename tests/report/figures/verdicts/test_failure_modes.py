@@ -33,7 +33,3 @@ def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up,
         for row in range(len(learners)):
             assert sum(parts[row, part] for part in range(6)) == 16
     assert source_of(figure) == found.mark
-
-
-def test_a_study_in_which_all_went_well_says_so(made_up):
-    assert failure_modes.reasons(made_up()).get_suptitle() == "0 of 80 runs failed"
