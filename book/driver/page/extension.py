@@ -11,6 +11,7 @@ from sphinx.application import Sphinx
 
 from driver.project import ROOT
 
+DEPARTURE = re.compile(r"\s*# departure ([A-Z])")
 FLOATS = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
 OBJECT = re.compile(r"<(?:[^<>]|<[^<>]*>)*>")  # `<factory>` or `<function ...>`
 TABLE = re.compile(r"<table\b.*?</table>", flags=re.S)
@@ -49,8 +50,8 @@ def with_aliases_of_fields(app: Sphinx, doctree: nodes.document, page: str) -> N
 def without_macros(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
 ) -> None:
-    """A docstring in which `|speed|` is an absolute value and no macro of reStructuredText."""
-    lines[:] = [line.replace("|", r"\|") for line in lines]
+    """A docstring in which `|speed|` is no macro of reStructuredText, and departures are named."""
+    lines[:] = [DEPARTURE.sub(r" (our assumption \1)", line.replace("|", r"\|")) for line in lines]
 
 
 def with_tags(app: Sphinx, doctree: nodes.document) -> None:
