@@ -41,12 +41,15 @@ def imports(notebook: Path) -> set[str]:
     return found | {f"{node.module}.{one.name}" for node in chosen for one in node.names}
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "book").glob("your_*.ipynb")), ids=lambda p: p.stem)
-def test_a_notebook_of_ones_own_uses_what_the_pages_describe(page):
+def test_the_chapter_on_ones_own_problem_uses_what_the_pages_describe():
     known = set.union(*map(entries, PAGES.values()))
     homes = {name.rpartition(".")[0] for name in known}
-    ours = {name for name in imports(page) if name.startswith("nmpcrl")}
-    assert {n for n in ours - known - homes if not n.startswith("nmpcrl.report")} == set()
+    ours = {name for name in imports(ROOT / "book/09_your_own.ipynb") if name.startswith("nmpcrl")}
+    inner = tuple(
+        f"nmpcrl.{one}"
+        for one in ("report", "studies", "study.problems", "study.published", "course")
+    )
+    assert {name for name in ours - known - homes if not name.startswith(inner)} == set()
 
 
 def test_functions_of_the_notation_are_there():
@@ -79,16 +82,3 @@ def test_the_built_page_has_signatures_and_the_comments_beside_fields(site):
     assert "state : Array" in solve
     features = article.find(id="nmpcrl.control.Solution.features").parent.get_text(" ", strip=True)
     assert "phi, the value’s gradient in theta, shape (2n + m + 1,)" in features
-
-
-def test_every_cell_of_the_comparison_says_how_it_was_checked():
-    text = (ROOT / "book/which_library.md").read_text()
-    table = text.partition("## Feature by feature\n")[2].partition("\n## ")[0]
-    rows = [line.strip("|").split(" | ") for line in table.splitlines() if line.startswith("|")]
-    names, _, *features = rows
-    assert len(features) > 20
-    for row in features:
-        assert len(row) == len(names)
-        for cell in row[1:]:
-            assert re.search(r"\([RSDP]\)$|^not (checked|applicable)$", cell.strip()), cell
-    assert re.search(r"written on \d+ \w+ \d{4}", text)

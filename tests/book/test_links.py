@@ -18,7 +18,10 @@ from nmpcrl.study.departures import DEPARTURES
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = yaml.safe_load((ROOT / "_toc.yml").read_text())["parts"]
 NUMBERED = [page["file"] for part in PARTS if part.get("numbered") for page in part["chapters"]]
-CHAPTER = {Path(page).stem: number for number, page in enumerate(NUMBERED, 1)}
+CHAPTER = {
+    stem: int(stem[:2]) if stem[:2].isdigit() else number
+    for number, stem in enumerate((Path(page).stem for page in NUMBERED), 1)
+}
 KINDS = {"eq": "Eq. ({})", "fig": "Fig. {}", "alg": "Algorithm {}", "ex": "Exercise {}"}
 
 Link = tuple[str, str, str]  # words, page, label

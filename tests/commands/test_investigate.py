@@ -10,14 +10,14 @@ import pytest
 from nmpcrl.claims.investigation import of_file
 from nmpcrl.study.refusal import Refusal
 
-PAGE = Path(__file__).parents[2] / "book" / "your_paper.ipynb"
+PAGE = Path(__file__).parents[2] / "book" / "09_your_own.ipynb"
 
 pytestmark = pytest.mark.usefixtures("trains_here")
 
 
 @pytest.fixture
 def own(runs):
-    """The file of the page on a paper of one's own, in a folder of its own."""
+    """The file that Chapter 9 shows, in a folder of its own."""
     texts = ("".join(cell["source"]) for cell in json.loads(PAGE.read_text())["cells"])
     (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
     path = runs.parent / "mine" / "chain.py"

@@ -92,8 +92,8 @@ def _brief(cost: float) -> str:
 
 def _looks(names: Any) -> dict[str, Look]:
     """The look of each learner in the book, and of others the next that is free."""
-    free = iter(OWN * len(names))
-    return {name: LOOKS[name] if name in LOOKS else next(free) for name in names}
+    free, known = iter(OWN * len(names)), LOOKS | {"no learning": LOOKS["frozen"]}
+    return {name: known[name] if name in known else next(free) for name in names}
 
 
 def _known(values: pd.Series) -> pd.Series:

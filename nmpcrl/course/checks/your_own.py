@@ -1,4 +1,4 @@
-"""The exercises of the chapter on other people's problems."""
+"""The exercises of Chapter 9."""
 
 from typing import Any
 
@@ -107,4 +107,43 @@ def batch_step(theta: Vector, deltas: Vector, phis: Matrix, alpha: float, ridge:
     """theta + alpha (mean(phi phi') + ridge)^-1 mean(delta phi)."""
     hessian = phis.T @ phis / len(deltas) + ridge * np.eye(theta.size)
     moved: Vector = theta + alpha * np.linalg.solve(hessian, deltas @ phis / len(deltas))
+    return moved
+
+
+def clipped(answer: Any) -> Outcome:
+    """A semi-gradient step that removes at most the share kappa of its TD error."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        phi = rng.normal(size=4)
+        return {
+            "theta": rng.normal(size=4),
+            "delta": float(rng.normal()),
+            "phi": phi,
+            "alpha": float(rng.uniform(0.1, 2) / (phi @ phi)),
+            "kappa": float(rng.uniform(0.2, 1)),
+        }
+
+    return function(
+        answer,
+        clipped_step,
+        draw,
+        mistakes={
+            "It is the square of the length of phi that kappa is divided by.": lambda **one: (
+                clipped_step(**one | {"kappa": one["kappa"] * np.linalg.norm(one["phi"])})
+            ),
+            "The step is shortened: the smaller of the two.": lambda **one: clipped_step(
+                **one, choose=max
+            ),
+            "theta moves with delta phi: a lower error, not a larger one.": lambda **one: (
+                clipped_step(**one | {"delta": -one["delta"]})
+            ),
+        },
+    )
+
+
+def clipped_step(
+    theta: Vector, delta: float, phi: Vector, alpha: float, kappa: float, choose: Any = min
+) -> Vector:
+    """theta + min(alpha, kappa / |phi|^2) delta phi."""
+    moved: Vector = theta + choose(alpha, kappa / (phi @ phi)) * delta * phi
     return moved
