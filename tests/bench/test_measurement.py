@@ -7,7 +7,6 @@ from click.testing import CliRunner
 
 from nmpcrl.bench import measurement, solves
 from nmpcrl.commands import main
-from nmpcrl.study import ParameterError, StoreError
 from nmpcrl.study.files import folder
 
 
@@ -90,21 +89,6 @@ def test_what_was_timed_on_a_busy_machine_is_timed_again_where_calm_is_asked_for
     call()
     call()
     assert counted == ["short", "short"]
-
-
-def test_without_a_folder_to_keep_it_in_nothing_is_measured(counted):
-    folder().write_text("no folder")
-    with pytest.raises(StoreError, match="cannot be written"):
-        measurement.read_or_measure("short")
-    assert not counted
-
-
-@pytest.mark.parametrize("length", ["long", "", None, True, 3, ["full"]])
-@pytest.mark.parametrize("call", [measurement.read_or_measure, measurement.beforehand])
-def test_a_length_that_there_is_not_is_refused(counted, call, length):
-    with pytest.raises(ParameterError, match="must be one of smoke, short, full"):
-        call(length)
-    assert not counted
 
 
 def command(*words):

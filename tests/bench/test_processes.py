@@ -68,8 +68,3 @@ def test_a_process_of_its_own_hands_back_the_table():
     table = processes._time_learners(2)
     assert len(table) == 3 * 4
     assert list(table.ms_per_fit.isna()) == [True, True, False, False] * 3
-
-
-def test_a_measurement_that_fails_says_why():
-    with pytest.raises(RuntimeError, match=r"timing few steps(.|\n)*invalid literal"):
-        processes._time_learners("few")

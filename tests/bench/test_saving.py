@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nmpcrl.bench.learners import PAPER_SOLVE, ratio
+from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.saving import Saving, saving
 from nmpcrl.claims import published
 
@@ -18,10 +18,6 @@ def model(**changed) -> Saving:
         "rest_rdes": [0.02, 0.05],
     }
     return Saving(**{name: np.array(one) for name, one in (parts | changed).items()})
-
-
-def test_the_paper_s_hours_are_0_83_s_a_solve():
-    assert pytest.approx(0.83, abs=0.005) == PAPER_SOLVE
 
 
 def test_the_ratio_of_the_learners_breaks_even_where_it_says_and_comes_down_to_what_u_allows():

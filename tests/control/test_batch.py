@@ -1,14 +1,10 @@
 """`Nmpc.solve_many`: the solutions of `solve` to the last bit, and Ipopt's to its tolerance."""
 
-import threading
-
 import numpy as np
 import pytest
 from small_problems import limited, pendulum, tank
 
 from nmpcrl.control import Ipopt, Nmpc, SolverError
-from nmpcrl.control.batch import TEXT
-from nmpcrl.control.codegen.jit import load
 
 COUNT = 8
 PARTS = ("value", "features", "point", "iterations", "violation", "restarts", "status", "action")
@@ -106,24 +102,3 @@ def test_a_shape_is_refused_with_the_one_to_give(nmpc):
     ):
         with pytest.raises(ValueError, match=said):
             nmpc.solve_many(*given)
-
-
-def test_python_runs_on_while_a_batch_is_solved(nmpc, monkeypatch):
-    states, thetas, _, _ = drawn(nmpc, 3000)
-    code, reports, ended, shares = load("many", {"__init__": TEXT}), [], threading.Event(), []
-
-    class Watched:
-        @staticmethod
-        def many(*given):
-            given[-1][:] = np.nan
-            reports.append(given[-1])
-            code.many(*given)
-            ended.set()
-
-    monkeypatch.setattr("nmpcrl.control.batch.load", lambda *_: Watched)
-    solving = threading.Thread(target=nmpc.solve_many, args=(states, thetas), kwargs={"threads": 1})
-    solving.start()
-    while not ended.wait(1e-3):
-        shares += [np.isfinite(report[:, 0]).mean() for report in reports]
-    solving.join()
-    assert any(0 < share < 1 for share in shares)  # never, where machine code holds Python's lock

@@ -15,7 +15,6 @@ pytestmark = pytest.mark.usefixtures("interpreted")
 N, GAMMA, T, W = 8, 0.97, 0.2, 20.0
 CORNERS = np.array([[1.0, 0.2], [0.2, 1.0], [-1.0, 0.3]])  # outward normals of a polygon
 SIDES = np.array([0.8, 0.9, 0.6])
-MOVES = np.column_stack([np.sin(0.4 * np.arange(N + 1)), 0.5 * np.cos(0.4 * np.arange(N + 1))])
 DISC = np.column_stack([0.1 * np.arange(N + 1), 0.5 - 0.05 * np.arange(N + 1)])  # which moves
 LAST = np.array([-1.0, 0.5])  # input
 THETA = {"drag": 0.3, "r": 0.05, "limit": 0.0}
@@ -123,17 +122,6 @@ def test_a_row_holds_as_by_hand(name, hard):
     assert max(beyond) == pytest.approx(0, abs=1e-6)  # it binds, and is kept to
     assert solution.violation <= 1e-6
     assert agrees(nmpc, solution, 2e-4)
-
-
-def test_a_reference_may_move():
-    """As data: in the problem, or given to each solve."""
-    state, own, other = np.array([0.3, 0.4, 0.0, 0.5]), point(Series(MOVES)), point()
-    solution = Nmpc(own, solver=Riccati(1e-11)).solve(state, own.theta)
-    value, states, _ = by_hand(solution, Row(drift, [], state), MOVES)
-    assert solution.value == pytest.approx(value, abs=1e-6)
-    np.testing.assert_allclose(solution.states, states, atol=2e-4)
-    given = Nmpc(other, solver=Riccati(1e-11)).solve(state, own.theta, data={"target": MOVES})
-    np.testing.assert_array_equal(given.point, solution.point)
 
 
 def train(stages: Any, solver: str = "riccati") -> Nmpc:

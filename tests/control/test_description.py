@@ -1,12 +1,9 @@
 """A controller is a value: pickled or copied it solves alike, and its key says what it is."""
 
 import copy
-import gc
 import pickle
 import subprocess
 import sys
-import weakref
-from dataclasses import replace
 
 import casadi as ca
 import cloudpickle
@@ -15,7 +12,6 @@ import pytest
 from small_problems import tank
 
 from nmpcrl.control import Fatrop, Hard, Ipopt, Nmpc, Plant, Problem, Riccati, Series, Soft, Task
-from nmpcrl.control.codegen import jit
 from nmpcrl.control.content import NoContent
 from nmpcrl.control.solvers import stages
 from nmpcrl.study import paper
@@ -127,40 +123,6 @@ def test_a_copy_another_layout_horizon_or_discount_takes_no_other_machine_code()
         assert len({stages.write(problem) for problem in problems}) == 1
 
 
-@pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("k", [0, 2])
-def test_what_nobody_holds_any_more_is_forgotten(k):
-    """A search over plants, tasks and problems keeps none of them."""
-    nmpc, state, theta = controllers()[k]
-    task = copy.copy(nmpc.task)
-    nmpc = Nmpc(nmpc.plant, task, 2) if task else Nmpc(cart())
-    known = [nmpc, nmpc.problem, *([nmpc.plant, task] if task else [])]
-    solution = nmpc.solve(state, theta)
-    nmpc.value_hessian_times(solution, theta)
-    nmpc.policy_jacobian(solution)
-    if task:
-        task.stage_cost(state, nmpc.clip(np.zeros(nmpc.m)))
-    left = [weakref.ref(one) for one in known]
-    del nmpc, task, known, solution
-    gc.collect()
-    assert [one() for one in left] == [None] * len(left)
-
-
-FIELDS = {0: ("lower", "upper"), 1: ("start", "target", "lower", "upper", "weights")}
-
-
-@pytest.mark.parametrize(("k", "name"), [(k, name) for k in FIELDS for name in FIELDS[k]])
-def test_an_array_of_a_plant_or_a_task_cannot_be_changed(k, name):
-    original = pendulum()[k]
-    given = np.array(getattr(original, name))
-    made, before = replace(original, **{name: given}), given.copy()
-    given[:] = 0.0  # an array that is used again for another
-    for one in (made, copy.deepcopy(made)):
-        np.testing.assert_array_equal(getattr(one, name), before)
-        with pytest.raises(ValueError, match="read-only"):
-            getattr(one, name)[0] = 1.0
-
-
 def test_a_key_says_what_a_user_wrote():
     """With all that his code reads, and not where it stands."""
     one, again = (rewritten(Nmpc, "solve", 1)(cart()) for _ in range(2))
@@ -173,13 +135,6 @@ def test_a_key_says_what_a_user_wrote():
     plain.solve = np.random.default_rng(0)
     with pytest.raises(NoContent, match="a Generator"):
         _ = plain.key
-
-
-def test_without_numba_the_key_is_that_of_what_solves(monkeypatch):
-    key, other = paper.nmpc().key, Nmpc(cart(), solver=Fatrop()).key
-    monkeypatch.setattr(jit, "numba_version", lambda: None)
-    assert paper.nmpc().key == paper.nmpc(solver="fatrop").key != key
-    assert Nmpc(cart(), solver=Riccati(starts=3)).key == other
 
 
 def test_a_key_is_that_of_the_content_and_any_other_number_or_name_is_another_key():

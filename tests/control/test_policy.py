@@ -36,12 +36,6 @@ def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before(nmpc, the
         assert [policy(state).tolist() for state in loop.states] == loop.actions.tolist()
 
 
-def test_make_step_takes_and_gives_columns_as_do_mpc(nmpc, theta):
-    action = Policy(nmpc, theta).make_step(STATE[:, None])
-    assert action.shape == (1, 1)
-    assert action[:, 0] == nmpc.solve(STATE, theta).action
-
-
 def test_stable_baselines_evaluates_a_policy_to_the_cost_of_a_rollout(nmpc, theta):
     pytest.importorskip("stable_baselines3")
     from stable_baselines3.common.evaluation import evaluate_policy
@@ -52,16 +46,6 @@ def test_stable_baselines_evaluates_a_policy_to_the_cost_of_a_rollout(nmpc, thet
     loop = evaluate(nmpc, theta, STEPS, plant=moved(nmpc), start=STATE)
     assert reward == pytest.approx(-loop.cost)
     assert spread == pytest.approx(0, abs=1e-12)
-
-
-def test_predict_takes_many_observations_and_begins_anew_with_an_episode(nmpc, theta):
-    policy = Policy(nmpc, theta)
-    actions, plans = policy.predict(np.array([STATE, -STATE]))
-    assert actions.shape == (2, 1)
-    again, _ = policy.predict(np.array([STATE, -STATE]), plans, np.array([True, False]))
-    cold, warm = nmpc.solve(STATE, theta), nmpc.solve(-STATE, theta, plans[1][0])
-    assert again.ravel().tolist() == [*cold.action, *warm.action]
-    assert policy.predict(STATE)[0].shape == (1,)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from nmpcrl.control import (
     Soft,
     SolverError,
     differential_drive,
-    rk4,
 )
 
 STRANGER = ca.SX.sym("stranger")
@@ -204,17 +203,6 @@ def test_why_a_solve_failed_is_told_with_what_to_write(changes, said):
     assert re.match(said, why)
 
 
-def test_a_kink_can_be_written_as_rows():
-    """|u| as a cost, where plans come to rest at u = 0, is nothing that a solver can do."""
-    sharp = problem(stage=lambda x, u, th: ca.sumsqr(x) + 9 * ca.fabs(u), lower=-1, upper=1)
-    with pytest.raises(SolverError, match=r"; stage has a kink \(fabs\); .* Soft\("):
-        Nmpc(sharp, solver="ipopt").solve(np.array([0.4, 0.2]), sharp.theta)
-    rows = Soft(lambda x, u, th: ca.vertcat(u, -u), weight=9)
-    same = problem(stage=lambda x, u, th: ca.sumsqr(x), soft=rows, lower=-1, upper=1)
-    solution = Nmpc(same, solver="ipopt").solve(np.array([0.4, 0.2]), same.theta)
-    assert solution.value == pytest.approx(3 * (0.4**2 + 0.2**2))  # and u = 0
-
-
 WEIGHED = {
     "theta": {"q": 1.0, "r": 0.1, "root": 0.5, "slope": 0.3, "off": np.eye(2) + 0.1, "a": 0.9},
     "model": lambda x, u, th: th["a"] * x + u,
@@ -247,41 +235,3 @@ def test_weights_that_turn_negative_are_named_once(values, names):
         assert f"theta {name} turned negative" in str(one.message)
         assert "write Parameter(start, lower=0)" in str(one.message)
         assert one.filename == __file__
-
-
-def test_numpys_functions_write_what_casadis_do():
-    """They need no refusal: np.sin of a symbol is ca.sin of it, as np.where is ca.if_else."""
-    ours = problem(
-        model=lambda x, u, th: np.array([np.sin(x[0]), np.where(x[1] > 0, x[1], 2 * x[1])]) + u,
-        stage=lambda x, u, th: np.linalg.norm(x) ** 2 + np.maximum(u, 0) + np.abs(x[0]),
-    )
-    same = problem(
-        model=lambda x, u, th: ca.vertcat(ca.sin(x[0]), ca.if_else(x[1] > 0, x[1], 2 * x[1])) + u,
-        stage=lambda x, u, th: ca.norm_2(x) ** 2 + ca.fmax(u, 0) + ca.fabs(x[0]),
-    )
-    assert ours.key == same.key
-
-
-@pytest.mark.usefixtures("interpreted")
-def test_substeps_make_a_fast_model_one_that_can_be_planned_with():
-    """A motor whose current settles in 1 ms, sampled at 10 ms."""
-
-    def motor(substeps):
-        def dynamics(x, u):
-            return ca.vertcat((u - 0.5 * x[0] - 0.01 * x[1]) / 1e-3, (x[0] - 0.1 * x[1]) / 0.1)
-
-        return problem(
-            theta={"target": 5.0}, horizon=5, lower=-12, upper=12,
-            model=lambda x, u, th: rk4(dynamics, x, u, 0.01, substeps=substeps),
-            stage=lambda x, u, th: (x[1] - th["target"]) ** 2 + 1e-3 * u**2,
-            terminal=lambda x, th: 10 * (x[1] - th["target"]) ** 2,
-        )  # fmt: skip
-
-    with pytest.raises(SolverError, match=r"model makes 1e\+01 times .* substeps"):
-        Nmpc(motor(1), solver="ipopt").solve(np.array([900.0, 0.0]), motor(1).theta)
-    nmpc = Nmpc(motor(8))
-    solution = nmpc.solve(np.zeros(2), motor(8).theta)
-    ipopt = Nmpc(motor(8), solver=Ipopt(1e-10)).solve(np.zeros(2), motor(8).theta)
-    np.testing.assert_allclose(solution.states, ipopt.states, atol=1e-4)
-    assert 0 < solution.states[-1, 1] < 6
-    assert np.abs(solution.states[:, 0]).max() < 24.1  # [A], 12 V through half an ohm

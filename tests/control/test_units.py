@@ -84,20 +84,6 @@ def test_an_error_names_the_state_in_its_own_units():
         nmpc.solve(STATE * 1e5, nmpc.problem.theta)
 
 
-def test_a_parameter_may_be_as_large_as_it_starts():
-    """The frequency of an Arrhenius law is 7.2e10 a minute."""
-    problem = tank(
-        1.0,
-        theta={"k": 7.2e10, "target": np.array([1.3, 1.2])},
-        stage=lambda x, u, th: ca.sumsqr(x - th["k"] / 7.2e10) + ca.sumsqr(u),
-        model=lambda x, u, th: x + 0.1 * ca.vertcat(u - th["k"] * ca.exp(-25.0) * x[0], -x[1]),
-        terminal=None,
-    )
-    assert Nmpc(problem).solve(STATE, problem.theta).value > 0
-    with pytest.raises(ValueError, match=r"theta .* of size at most 7.2e\+13"):
-        Nmpc(problem).solve(STATE, problem.theta * 1e4)
-
-
 @each
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-7, 1e5])
 @pytest.mark.parametrize("of", ["a state of that unit", "a state", "an input"])

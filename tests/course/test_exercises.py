@@ -6,7 +6,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from nmpcrl.course.exercises import NoExercise, clear_solutions, exercises, tags_of
+from nmpcrl.course.exercises import clear_solutions, exercises
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 NOTEBOOKS = {path.stem: nbformat.read(path, 4) for path in sorted(BOOK.glob("*.ipynb"))}
@@ -57,12 +57,6 @@ def test_without_its_solution_an_answer_is_what_stood_before_it():
     assert cleared.cells[3].source == "check.one(x)"
 
 
-def test_an_exercise_without_points_is_refused_with_its_first_words():
-    wrong = new_notebook(cells=[markdown("**Exercise 1.1.** How?", "exercise")])
-    with pytest.raises(NoExercise, match=r"'\*\*Exercise 1.1.\*\* How\?' does not begin with"):
-        list(exercises(wrong))
-
-
 @pytest.mark.parametrize("name", EXERCISED)
 def test_a_chapter_has_four_to_six_exercises_in_order_each_complete(name):
     every = list(exercises(NOTEBOOKS[name]))
@@ -78,9 +72,3 @@ def test_a_chapter_has_four_to_six_exercises_in_order_each_complete(name):
         for cell, title in zip([*one.parts["solution"], *one.parts["hint"]], titles, strict=True):
             assert cell.source.startswith(f"<details><summary>{title}</summary>\n\n")
             assert cell.source.endswith("\n\n</details>")
-
-
-def test_every_tagged_question_is_found():
-    for name in EXERCISED:
-        tagged = [c for c in NOTEBOOKS[name].cells if "exercise" in tags_of(c)]
-        assert [one.text for one in exercises(NOTEBOOKS[name])] == tagged

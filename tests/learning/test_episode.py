@@ -157,13 +157,6 @@ def test_a_solve_that_fails_warm_is_begun_anew_by_both(failing, name):
     assert 0 < (columns["restarts"] > 0).sum() < 30
 
 
-def test_where_every_start_fails_fatrop_takes_over_in_both(failing):
-    nmpc = failing(all_fail=True)
-    assert_same(MAKE["ES"], nmpc)
-    made = [step.plan for step in train(MAKE["ES"](nmpc), nmpc, weights(), noise())]
-    assert {plan.solver for plan in made if plan.took_over} == {"fatrop"}
-
-
 def test_where_no_solver_finds_an_optimum_the_episode_ends_in_both(failing, monkeypatch):
     failed = raising(SolverError("failed", THETA[:3], THETA))
     monkeypatch.setattr("nmpcrl.control.solvers.nlpsol.Program.solve", failed)

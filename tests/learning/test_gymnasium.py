@@ -71,14 +71,6 @@ def test_the_seeds_of_an_environment_come_from_the_generator(car):
     assert len({tuple(step.state) for step in trained(car, Slow()) if step.time == 0}) == 3
 
 
-def test_an_environment_of_gymnasiums_own_is_taken(car):
-    env = gymnasium.make("MountainCarContinuous-v0", max_episode_steps=15)
-    rollout = evaluate(car, car.problem.theta, 100, plant=env, rng=4)
-    assert not rollout.failure
-    assert len(rollout.costs) == 15
-    np.testing.assert_allclose(rollout.costs, 0.1 * rollout.actions[:, 0] ** 2, rtol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("make", "options", "message"),
     [
@@ -94,13 +86,6 @@ def test_an_environment_of_another_kind_is_refused(car, make, options, message):
         evaluate(car, car.problem.theta, 5, plant=make(), **options)
 
 
-def test_a_plant_that_runs_away_is_an_error_of_the_environment(car):
-    env = as_gymnasium(car, plant=lambda x, u, rng: (np.nan * x, 0.0, False), start=[0.0, 0.0])
-    env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"plant returned .nan nan.; a state is 2 finite numbers"):
-        env.step(np.zeros(1))
-
-
 @pytest.mark.filterwarnings("ignore:.*Box observation space:UserWarning")
 @pytest.mark.filterwarnings("ignore:.*For Box action spaces:UserWarning")
 def test_ours_pass_gymnasiums_own_check(robot, car):
@@ -111,12 +96,6 @@ def test_ours_pass_gymnasiums_own_check(robot, car):
 
     env = as_gymnasium(car, plant=hilly, start=lambda rng: rng.uniform(-1, 1, 2))
     check_env(env, skip_render_check=True)
-
-
-def test_there_and_back_is_the_same_run(robot):
-    ours, theirs = (trained(robot, plant, shape=(2, 8)) for plant in (None, as_gymnasium(robot)))
-    assert [step.cost for step in ours] == [step.cost for step in theirs]
-    np.testing.assert_array_equal(ours[-1].weights.theta, theirs[-1].weights.theta)
 
 
 def test_an_environment_of_ours_takes_an_agents_own_numbers_and_is_truncated_after_its_steps(robot):

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, Parameter, Problem, Soft
+from nmpcrl.control import Nmpc, Parameter, Problem
 from nmpcrl.learning import (
     Exploration,
     Learner,
@@ -67,31 +67,6 @@ def test_lstd_q_learns_a_constant_value_as_the_closed_form_has_it():
     assert result.vector.tolist() == result.policy.theta.tolist() == [ended[-1]]
 
 
-def test_lstd_q_needs_no_bounds_of_theta():
-    """The example of Gros and Zanon, where steps without a limit end in a model that fails."""
-    linear = Problem(
-        states=2, inputs=1, horizon=10, gamma=0.9, lower=-1, upper=1,
-        theta={"A": [[1, 0.25], [0, 1]], "B": [0.03, 0.25], "b": np.zeros(2)},
-        model=lambda x, u, th: th["A"] @ x + th["B"] * u + th["b"],
-        stage=lambda x, u, th: 0.5 * ca.sumsqr(x) + 0.25 * ca.sumsqr(u),
-        terminal=lambda x, th: 5 * ca.sumsqr(x),
-        soft=[Soft(lambda x, u, th: -x[0], weight=50.0)],
-    )  # fmt: skip
-
-    def plant(x, u, rng):
-        push = np.array([0.08, 0.2]) * u + [rng.uniform(-0.1, 0), 0]
-        return np.array([[0.9, 0.35], [0, 1.1]]) @ x + push, linear.cost(x, u), False
-
-    nmpc = Nmpc(linear, solver="fatrop")
-    how = {"plant": plant, "start": [0, 0.15], "episodes": 4, "every": 20, "confirm": 1}
-    assert learn(nmpc, stride=np.inf, **how).costs[-1] > 1e4
-    result = learn(nmpc, **how)
-    moved = np.abs(np.diff(result.history["theta"], axis=0))
-    size = np.maximum(np.abs(result.history["theta"][:-1]), linear.theta_sizes)
-    assert (moved / size).max() == pytest.approx(0.3)
-    assert result.costs.min() < 0.5 * result.costs[0]
-
-
 def test_learn_makes_the_steps_of_train(nmpc):
     result = learn(nmpc, "QL", alpha=1e-2, episodes=3, steps=5, deviation=0.2, seed=4, **WORLD)
     explore = Exploration(episodes=3, steps=5, deviation=0.2, seed=4)
@@ -133,25 +108,6 @@ def test_a_divergence_says_what_was_reached_and_a_long_step_how_long_it_may_be(n
     longest = np.square(np.linalg.norm(first, axis=1)).max()
     said = next(one for one in result.warnings if "phi" in one)
     assert float(said.split("below ")[-1]) == pytest.approx(2 / longest, rel=0.05)
-
-
-def falling(nmpc, by) -> Learner:
-    """A learner that moves theta by the same at every step."""
-    rule = UpdateRule(lambda theta, memory, *_: (theta + by, memory))
-    return Learner("falling", SecondSolve(nmpc), rule, nmpc.gamma)
-
-
-def test_a_weight_that_turns_negative_is_named_and_other_parameters_may(nmpc):
-    how = WORLD | {"episodes": 2, "steps": 3}
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        learn(nmpc, falling(nmpc, [0, 0, -1.0]), **how)  # V0
-    fresh = Nmpc(problem(), solver="fatrop")  # which has warned of nothing yet
-    with pytest.warns(UserWarning, match="theta weight") as found:
-        result = learn(fresh, falling(fresh, [0, -0.26, 0.0]), **how)
-    (said,) = result.warnings
-    assert [str(one.message) for one in found] == [said]
-    assert said.startswith("theta weight turned negative in episode 1, and weighs a cost")
 
 
 def test_noise_that_is_clipped_at_both_bounds_is_told_with_shares(nmpc):

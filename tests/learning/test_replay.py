@@ -7,7 +7,6 @@ from nmpcrl.control import Nmpc, Parameter, Problem
 from nmpcrl.learning import (
     Exploration,
     Weights,
-    learn,
     lstd_q,
     policy_gradient,
     q_learning,
@@ -56,13 +55,6 @@ def test_a_replayed_step_is_a_step_along_the_transition_solved_anew(nmpc):
     delta = plain.cost + 0.9 * value - again.value
     by_hand = theta + ALPHA * delta * again.features
     np.testing.assert_allclose(found.weights.theta, by_hand, atol=1e-7)
-
-
-def test_replay_learns_more_of_as_many_steps_on_the_plant(nmpc):
-    base = q_learning(nmpc, ALPHA)
-    how = WORLD | {"episodes": 3, "steps": 15, "deviation": 0.2}
-    once, often = (learn(nmpc, one, **how).theta["gain"] for one in (base, replayed(base, nmpc, 8)))
-    assert once < often < 0.75
 
 
 @pytest.mark.parametrize("make", [lstd_q, policy_gradient])

@@ -108,18 +108,6 @@ def test_arguments_that_cannot_be_trained_are_refused_at_the_call(robot, refused
         refused(robot)
 
 
-@pytest.mark.parametrize("theta", [THETA.copy(), THETA.tolist()])
-def test_weights_may_be_lists_and_are_left_as_they_are(robot, theta):
-    def in_place(theta, memory, *_):
-        theta[:] += 1.0
-        return theta, memory
-
-    learner = replace(es(robot), rule=UpdateRule(in_place))
-    *_, last = train(learner, robot, Weights(theta, [0.0] * 9), noise(1, 3))
-    np.testing.assert_array_equal(last.weights.theta, THETA + 3)
-    np.testing.assert_array_equal(theta, THETA)
-
-
 def test_a_solve_in_the_state_itself_is_the_next_warm_start_and_else_the_plan_before():
     controller = Faulty(lambda call: False)
     expected = []
@@ -221,23 +209,3 @@ def test_a_rollout_that_fails_costs_infinity_and_keeps_its_steps(first):
     assert (failed.states.shape, failed.actions.shape) == ((first, 3), (first, 2))
     assert failed.cost == np.inf
     assert f"call {first} failed" in failed.failure
-
-
-class Acting:
-    """A controller with a solve alone, which has its NMPC as an attribute or not."""
-
-    def __init__(self, nmpc, inner):
-        self.inner = inner
-        self.solve = lambda state, theta, plan: nmpc.solve([*state, 0.0][:3], theta, plan)
-
-
-def test_a_rollout_needs_no_more_than_a_solve_and_an_environment(robot):
-    ran, expected = (evaluate(one, THETA, 4) for one in (Acting(robot, robot), robot))
-    np.testing.assert_array_equal(ran.states, expected.states)
-    still = Exploration(np.zeros((1, 4, 2)), np.ones((1, 4)))
-    steps = train(frozen(robot), Acting(robot, robot), Weights(THETA), still)
-    np.testing.assert_array_equal([step.state for step in steps], ran.states)
-    plant = {"plant": lambda x, u, rng: (x[:2], float(u @ u), False), "start": [0.5, 0.2]}
-    assert evaluate(Acting(robot, None), THETA, 4, **plant).states.shape == (4, 2)
-    with pytest.raises(ValueError, match=r"give plant=.* and start="):
-        evaluate(Acting(robot, None), THETA, 4)

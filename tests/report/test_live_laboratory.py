@@ -48,12 +48,6 @@ def test_whatever_it_allows_an_experiment_takes(data):
                 Experiment(**{name: kind(field["most"]) * 2})
 
 
-def test_the_longest_horizon_has_a_discount_for_every_stage(data):
-    most = next(field["most"] for field in data["fields"] if field["name"] == "horizon")
-    discount = data["problem"]["discount"]
-    assert discount == (paper.GAMMA ** np.arange(most + 1.0)).tolist()
-
-
 def test_the_widths_of_the_strips_make_numpys_normal_numbers(data):
     """Within a strip a number is 52 bits times its width, with a sign."""
     widths = data["widths"]

@@ -12,7 +12,6 @@ from nmpcrl.claims import published
 from nmpcrl.learning import browser
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report import live
-from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.report.live import published_runs
 from nmpcrl.study import Experiment, design, paper
 
@@ -87,22 +86,9 @@ def test_the_published_theta_leads_to_the_published_cost(learner, known):
         assert rollout.cost == pytest.approx(cost, rel=SAME)
 
 
-def test_it_begins_with_the_first_two_learners(data):
-    wanted = {"first": "DES", "second": "RDES", "layout": "A", "decay": "step", "seed": 0}
-    assert data["chosen"] == wanted
-    assert data["episodes"] == list(range(0, 301, 10))
-    assert list(data["layouts"]) == list(design.LAYOUTS)
-
-
 def test_a_page_may_begin_with_another_layout(monkeypatch, known):
     monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
     shown = live.runs("ES", "GES", layout="E").data
     data = json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
     assert data["chosen"]["layout"] == "E"
     assert_published(unpacked(data["given"]), "E", known)
-
-
-def test_a_learner_has_the_look_of_the_printed_figures(data):
-    assert data["looks"]["RDES"]["color"] == LOOKS["RDES"].color
-    assert data["looks"]["DES"] == {"color": "var(--ink)", "dashes": "5.92 2.56"}
-    assert published_runs.look("GES")["dashes"] == "8 1.6"

@@ -1,18 +1,14 @@
 """Claims, departures and lists as pages write them."""
 
-from dataclasses import replace
-
 import pandas as pd
 import pytest
 
-from nmpcrl.claims import published
 from nmpcrl.claims.robustness import COLUMNS
 from nmpcrl.claims.verdict import (
     NOT,
     PARTLY,
     REPRODUCED,
     UNDECIDABLE,
-    Halves,
     Verdict,
 )
 from nmpcrl.report import text
@@ -32,11 +28,6 @@ def verdict(claim: str, outcome: str, layouts: str = "", decays: str = "") -> Ve
             name: read[letter] for name, letter in zip(("step", "episode"), decays, strict=False)
         },
     )
-
-
-def half(decay: str, against: int) -> Halves:
-    """Nine pairs in one reading of the decay, in which one of two learners diverged."""
-    return Halves(("DES", "RDES"), "diverged", decay, 9, (9 - against, against), against, 9)
 
 
 def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
@@ -61,21 +52,6 @@ def test_layouts_and_readings_disagree_where_two_decided_verdicts_differ(
     judged = [verdict("C5", PARTLY, layouts, decays), verdict("C8", NOT)]
     depending = text.depends_on(judged, table())
     assert ("B" in depending, "C" in depending) == disagreeing
-
-
-def test_the_first_claim_of_the_published_study_depends_on_the_reading_of_the_decay():
-    claims = [v for v in published.load().verdicts if v.claim == "C1"]
-    assert text.depends_on(claims, table())["C"] == ("C1",)
-
-
-def test_a_claim_that_turns_round_with_the_reading_of_the_decay_depends_on_it():
-    same = verdict("C1", PARTLY, "pp", "pp")
-    claimed, other = half("step", 0), half("episode", 0)
-    turned = replace(same, halves=(claimed, half("episode", 5)))
-    assert text.depends_on([turned], table()) == {"C": ("C1",)}
-    unsure = replace(same, halves=(half("step", 3), half("episode", 5)))
-    for one in (same, unsure, replace(same, halves=(claimed, other))):
-        assert text.depends_on([one], table()) == {}
 
 
 def test_a_departure_counts_every_variant_that_reads_it_otherwise():

@@ -48,23 +48,6 @@ def step(state, action, out):
 
 EXPORTS = (step,)
 """
-ARRAYS = """import numpy as np
-from numba import float64, njit
-
-@njit(float64(float64))
-def last_of_two(x):
-    one, other = np.full(1000, x), np.full(2000, 2.0 * x)
-    return one[-1] + other[-1]
-
-@njit(float64(float64))
-def f(calls):
-    kept, total = np.full(10, 1.0), 0.0
-    for k in range(int(calls)):
-        total += last_of_two(1.0 * k)
-    return total + kept.sum()
-
-EXPORTS = (f,)
-"""
 
 
 def of_x(body: str) -> dict[str, str]:
@@ -168,11 +151,6 @@ def test_the_largest_layout_fits_and_a_host_that_reserves_too_much_is_told(robot
     module("reserve", end - module("reserve", 8) - 1000)  # too little is left for the solver
     with pytest.raises(MemoryError):
         there.solve(start, THETA)
-
-
-def test_arrays_are_given_back_when_nothing_refers_to_them_any_more():
-    """240 MB of them, one after the other, in the 4 MB of a module."""
-    assert Module(from_texts({"arrays": ARRAYS}))("f", 10_000) == 3.0 * sum(range(10_000)) + 10
 
 
 def test_a_module_is_made_once_with_the_same_bytes_and_again_after_damage(tmp_path, monkeypatch):

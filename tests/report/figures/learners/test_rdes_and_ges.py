@@ -32,33 +32,6 @@ def heading(figure: Figure) -> str:
     return figure.get_suptitle() or figure.axes[0].get_title(loc="left")
 
 
-def test_the_value_that_es_solved_for_is_the_one_the_next_step_carries_back(study):
-    records = one(study, "ES")
-    error = metrics.online_error(records)
-    plain = records.steps["next_value"][:-1] - records.steps["value"][1:]
-    assert np.nanmedian(np.abs(error)) < 1e-2 * np.nanmedian(np.abs(plain))
-
-
-def test_the_last_step_of_an_episode_has_no_online_error(study):
-    error = metrics.online_error(one(study, "ES"))
-    last = one(study, "ES").steps["time"] == SMALL["steps"] - 1
-    assert np.isnan(error[last]).all()
-    assert np.isfinite(error[~last]).all()
-
-
-def test_theta_before_is_theta_after_shifted_by_a_step(study):
-    before = metrics.theta_before(one(study, "ES"))
-    np.testing.assert_array_equal(before[0], paper.THETA_INIT)
-    np.testing.assert_array_equal(before[1:], one(study, "ES").steps["theta"][:-1])
-
-
-def test_a_summary_by_episode_skips_what_is_not_known(study):
-    records = one(study, "ES")
-    column = records.steps["episode"].astype(float)
-    column[records.steps["episode"] == 1] = np.nan
-    np.testing.assert_array_equal(metrics.by_episode(records, column, np.max), [0, np.nan, 2, 3])
-
-
 def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(study):
     """Against a second solve in the next state, at steps where the features are smooth."""
     records = one(study, "GES")
@@ -69,12 +42,6 @@ def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(stud
         after = nmpc.solve(steps["state"][k + 1], before[k], solution)
         expected = paper.GAMMA * parts.predicted[k] * after.features
         np.testing.assert_allclose(parts.correction[k], expected, rtol=1e-3, atol=1e-3)
-
-
-def test_es_has_no_correction(study):
-    parts = directions(one(study, "ES"))
-    assert parts.share < 1e-6
-    assert parts.net == pytest.approx(1)
 
 
 @pytest.mark.parametrize(
@@ -121,21 +88,6 @@ def test_the_chain_s_figure_names_the_ratio_from_which_gradient_td_converges():
     assert heading(figure) == "Gradient TD converges once β is above 1.03 α"
 
 
-def test_the_name_of_the_paper_s_ratio_lies_on_no_curve():
-    figure = ges.on_the_chain(Chain(), 0.1, (0.1, 4.0), updates=50)
-    figure.draw_without_rendering()
-    right = figure.axes[1]
-    radius = max(right.get_lines(), key=lambda line: len(line.get_xdata()))
-    name = right.texts[0].get_window_extent()
-    assert not name.count_contains(right.transData.transform(radius.get_xydata()))
-
-
-def test_no_line_strikes_the_legend_of_the_corrections(study):
-    figure = ges.corrections(study)
-    figure.draw_without_rendering()
-    assert figure.legends[0].get_window_extent().y1 < figure.axes[0].get_window_extent().y0
-
-
 def test_the_gate_s_figure_says_how_far_theta_x_fell():
     literal, gated = (run(Experiment("RDES", episodes=2, gated=g)) for g in (False, True))
     figure = rdes.literal_and_gated(literal, gated)
@@ -152,13 +104,6 @@ def test_the_networks_figure_counts_the_runs_that_theta_helped(study):
 def test_the_curvature_s_figure_gives_the_median(study):
     measured = dropped_curvature(one(study, "GES"), samples=10)
     assert f"{np.median(measured.ratio):.1%}" in heading(ges.curvatures((measured,)))
-
-
-def test_the_figures_are_closed(study):
-    import matplotlib.pyplot as plt
-
-    few_runs.figure_1(study)
-    assert not plt.get_fignums()
 
 
 def test_a_run_that_was_stopped_ends_in_a_cross():

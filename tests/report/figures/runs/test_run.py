@@ -65,16 +65,6 @@ def test_any_run_can_be_read(known, arms, name):
     assert not flaws(run_page(known[name], arms(name)))
 
 
-def test_a_legend_lies_on_no_obstacle_and_no_line(known):
-    figure = run_page(known["ES"])
-    figure.draw_without_rendering()
-    on_map, on_theta = (axes.get_legend().get_window_extent() for axes in figure.axes[:2])
-    obstacles = [patch.get_window_extent() for patch in figure.axes[0].patches]
-    assert on_map.y1 < min(box.y0 for box in obstacles)
-    lines = [line.get_window_extent() for line in figure.axes[1].get_lines()]
-    assert on_theta.y0 > max(box.y1 for box in lines)
-
-
 def test_steps_above_2_are_counted_in_the_title(known):
     records = known["ES"]
     alpha_phi2 = np.where(np.arange(15) < 4, 3.0, 0.5)
@@ -83,24 +73,6 @@ def test_steps_above_2_are_counted_in_the_title(known):
     assert "None of 15 steps above 2" in titles(run_page(known["one episode"])) + titles(
         run_page(known["GES"])
     )
-
-
-def test_the_frozen_arm_is_drawn_beside_the_costs_only_if_it_is_there(known):
-    without, with_arm = run_page(known["ES"]), run_page(known["ES"], known["frozen"])
-    assert "its baseline is not stored" in without.get_supxlabel()
-    assert "its baseline is not stored" not in with_arm.get_supxlabel()
-    assert "its baseline is not stored" not in run_page(known["frozen"]).get_supxlabel()
-    lines = [len(figure.axes[3].get_lines()) for figure in (without, with_arm)]
-    assert lines == [1, 2]
-    assert any("of the baseline" in title for title in titles(with_arm))
-
-
-def test_the_title_has_the_numbers(known):
-    assert finding(known["frozen"]).startswith("A frozen theta keeps")
-    assert "in episode 1 of 3, where a component of theta was" in finding(known["diverged"])
-    before = known["ES"].evaluations["cost"][0]
-    assert f"{before:.0f}" in finding(known["ES"])
-    assert "no noise-free cost at the end" in verdict(known["diverged"])
 
 
 @pytest.mark.parametrize(

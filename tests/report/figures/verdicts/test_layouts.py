@@ -1,53 +1,29 @@
 """Layouts and robustness analysis: titles follow from the runs, and nothing is left undrawn."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from builders import summary_of
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from nmpcrl.analysis.rows import table
-from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.robustness import robustness_map
 from nmpcrl.report.figures.verdicts import layouts as figures
 from nmpcrl.report.figures.verdicts import robustness as maps
-from nmpcrl.study import Experiment, design, paper
+from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN as LEARNERS
 from nmpcrl.study.store import Runs
 
 VARIANT = "Q(s, a)"
 SEEDS = (0, 1, 2, 3, 4)
-START_COST = 1000.0
 # Between the last two obstacles of layout A, whose gap closes at theta_c = 0.36.
 WAY = np.array([[-2.5, 1.5, 0.0], [5.5, 0.5, 0.0], [7.5, 2.5, 0.0], [8.5, 2.0, 0.0]])
-
-
-def run(experiment: Experiment, gain: float, theta_c: float) -> RunSummary:
-    """A run that takes a share off the cost and ends with this theta_c; nothing goes wrong."""
-    count = experiment.episodes
-    known = dict.fromkeys(("cost", "delta", "loss", "bias", "error", "iterations", "seconds"), 1.0)
-    known |= dict.fromkeys(("failed", "restarts", "outside", "inputs", "over"), 0)
-    known |= {"steps": 130, "overlap": -0.1, "alpha_phi2": 0.4}
-    episodes = {name: np.full(count, value) for name, value in known.items()}
-    episodes |= {"theta": np.tile(paper.THETA_INIT, (count, 1)), "w": np.zeros((count, 9))}
-    episodes["inside"] = np.zeros((count, 3), int)
-    theta = np.tile(paper.THETA_INIT, (4, 1))
-    theta[:, -1] = np.linspace(theta[0, -1], theta_c, 4)
-    evaluations = {
-        "episode": np.linspace(0, count, 4).astype(int),
-        "theta": theta,
-        "cost": START_COST * np.array([1.0, 1 - gain, 1 - gain, 1 - gain]),
-        "inside": np.zeros((4, 3), int),
-        "overlap": np.full(4, -0.1),
-        "distance": np.zeros(4),
-    }
-    facts = {"stopped": "finished", "seconds": 1.0}
-    return RunSummary(asdict(experiment), episodes, evaluations, WAY, np.zeros((4, 2)), facts)
 
 
 def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
@@ -59,9 +35,8 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
     parts |= {e: VARIANT for e in varied if e not in parts}
     summaries = {}
     for experiment, part in parts.items():
-        learned = experiment.learner != "frozen"
-        gain = learned * (gained if part == VARIANT else 0.1)
-        summaries[experiment] = run(experiment, gain, 0.35 if learned else paper.THETA_INIT[-1])
+        gain = gained if part == VARIANT else 0.1
+        summaries[experiment] = summary_of(experiment, end=1 - gain, states=WAY)
     runs = table(summaries).assign(variant=list(parts.values()), source="published")
     return Evidence(Runs(summaries), runs)
 
@@ -116,22 +91,6 @@ def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
     assert "yes→no" in arrows
 
 
-def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(changing):
-    found, rows = changing
-    texts = written(maps.verdict_map(rows, "Some change", found.mark))
-    cells = [text for text in texts if text.startswith(("yes", "part", "no", "open"))]
-    assert len(cells) == len(rows)
-    assert {maps.named(name) for name in rows.variant} <= set(texts)
-    assert {"B", "C", "F"} <= set(texts)  # of the layouts, the decays and the variant
-
-
-def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():
-    found = study(episodes=4)
-    rows = robustness_map(found.runs, found.paths)
-    figure = maps.verdict_map(rows, "Some change", found.mark)
-    assert not frames(figure)
-
-
 def values(found: Evidence) -> dict[str, pd.DataFrame]:
     return {claim: one.measure(found.runs, found.paths) for claim, one in BY_RUNS.items()}
 
@@ -150,8 +109,3 @@ def test_a_claim_keeps_its_verdict_between_the_borders_named():
     assert figures.same_verdict(curve, 4.0) == (3.0, 5.0)
     assert figures.same_verdict(curve, 1.0) == (1.0, 2.0)
     assert figures.same_verdict(curve, 7.0) == (7.0, 7.0)
-
-
-def test_of_a_study_that_is_too_short_no_border_is_known():
-    figure = figures.borders(values(study(episodes=4).main), "")
-    assert figure.axes[0].get_title("left") == "C1: not decidable"
