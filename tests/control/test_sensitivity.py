@@ -13,6 +13,18 @@ from nmpcrl.study import paper
 THETA, START = np.array(paper.THETA_INIT), np.array(paper.START)
 
 
+@pytest.mark.parametrize("giver", ["fatrop", "ipopt"])
+def test_the_solution_may_be_another_solvers(controllers, draw, giver):
+    """CasADi's multiply by the dense Hessian."""
+    riccati, casadi, rng = controllers["riccati"], controllers[giver], np.random.default_rng(53)
+    for state, theta in draw(10, seed=53):
+        solution, along = casadi.solve(state, theta), rng.normal(size=9) * theta
+        dense = riccati.value_hessian(solution) @ along
+        np.testing.assert_array_equal(casadi.value_hessian_times(solution, along), dense)
+        product = riccati.value_hessian_times(solution, along)
+        np.testing.assert_allclose(product, dense, atol=1e-4 * np.abs(dense).max())
+
+
 def test_products_are_linear_and_the_hessian_behind_them_is_symmetric(controllers, draw):
     """u'Hv = v'Hu and H(u + t v) = Hu + t Hv, whatever is active and however weakly."""
     riccati, rng = controllers["riccati"], np.random.default_rng(54)

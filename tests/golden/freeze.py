@@ -115,15 +115,6 @@ def as_published() -> Any:
 
 
 @entry("verdicts")
-def claims() -> Any:
-    known = {**paper_claims.CLAIMS, **paper_claims.WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
-    names = ("learners", "threshold", "nothing", "linear_to", "unit", "implied")
-    return {
-        name: {field: getattr(one, field, None) for field in names} for name, one in known.items()
-    }
-
-
-@entry("verdicts")
 def thresholds_and_rule() -> Any:
     return {"numbers": prespecified.NUMBERS, "fixed": prespecified.fixed(study().about)}
 
@@ -313,24 +304,6 @@ def named(question: str, answer: Any) -> Any:
 @entry("population")
 def the_raised_costs() -> Any:
     return plain(raised(), RAISED)
-
-
-@entry("population")
-def expectations() -> Any:
-    known = {
-        "population": {
-            one.name: one for one in (*population.QUESTIONS, *interventions.INTERVENTIONS.questions)
-        },
-        "remedies": remedies.REMEDIES.asked,
-        "agents": agents.SAC_AND_TD3.asked,
-        "worlds": {one.name: one for one in worlds.WORLD_QUESTIONS},
-        "terminal costs": {one.name: one for one in worlds.TERMINAL_QUESTIONS},
-    }
-    expected = {
-        name: {one: asked.expected for one, asked in questions.items()}
-        for name, questions in known.items()
-    }
-    return expected | {"shares": population.EXPECTED}
 
 
 @entry("population")
