@@ -42,14 +42,14 @@ def missing(answer: Any) -> Outcome:
 
 
 def fall(answer: Any) -> Outcome:
-    """What a training cost, a frozen arm's and a rollout without noise say together."""
+    """What a training cost, a baseline's and a rollout without noise say together."""
     return choice(
         answer,
         "c",
         {
-            "a": "The frozen arm learned nothing, and its cost fell by more.",
+            "a": "The baseline learned nothing, and its cost fell by more.",
             "b": "Noise does not cost two policies the same, so the difference is not theirs.",
-            "c": "the rollout without noise is about the policy alone, and the frozen arm shows "
+            "c": "the rollout without noise is about the policy alone, and the baseline shows "
             "what decaying noise does.",
             "d": "The third number has no noise in it.",
         },
@@ -87,7 +87,7 @@ def drawdown(answer: Any) -> Outcome:
 
 
 def pairs(answer: Any) -> Outcome:
-    """Ratios of runs and their frozen arms, in tables of different order."""
+    """Ratios of runs and their baselines, in tables of different order."""
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
         cells = pd.MultiIndex.from_product([list("ABC"), range(4)], names=["layout", "seed"])
@@ -112,8 +112,35 @@ def pairs(answer: Any) -> Outcome:
             "Both tables are sorted, and so is the result: its order is not that of the runs.": (
                 lambda runs, frozen: ratios(runs.sort_values(["layout", "seed"]), frozen)
             ),
-            "That is the mean of all frozen arms; each run has its own.": (
+            "That is the mean of all baselines; each run has its own.": (
                 lambda runs, frozen: runs.cost.to_numpy() / frozen.cost.mean()
             ),
+        },
+    )
+
+
+def line(answer: Any) -> Outcome:
+    """The line of `one_file.py` by which noise decays with the episode."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        return {"noise": rng.normal(size=(rng.integers(3, 6), rng.integers(6, 9), 2))}
+
+    def decayed(noise: Any, exponent: Any = None) -> Any:
+        episode = np.arange(len(noise)).reshape(-1, 1, 1) if exponent is None else exponent
+        return noise * 0.99**episode
+
+    def per_step(noise: Any) -> Any:
+        return decayed(noise, np.arange(noise[..., 0].size).reshape(*noise.shape[:2], 1))
+
+    return function(
+        answer,
+        decayed,
+        draw,
+        mistakes={
+            "That is the decay per step, as the file has it.": per_step,
+            "So each episode begins anew: the factor is to fall from episode to episode.": (
+                lambda noise: decayed(noise, np.arange(noise.shape[1]).reshape(-1, 1))
+            ),
+            "The first episode has the factor 1.": lambda noise: 0.99 * decayed(noise),
         },
     )

@@ -3,15 +3,13 @@
 A run that had to be stopped left no policy: it is counted, and not drawn.
 """
 
-from collections import Counter
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.claims.failure_modes import ending
+from nmpcrl.claims.failure_modes import Ending, ending
 from nmpcrl.claims.published import Evidence
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task, legend, map_grid
@@ -66,7 +64,10 @@ def maps(found: Evidence) -> Figure:
     for axis in grid[:, 0]:
         axis.set_ylabel("y [m]")
     legend(figure, SHOWN)
-    return sourced(figure, f"In all layouts: {_endings(_learned(drawn))}", drawn)
+    ends = [ending(one.states, one.name.task) for one in _learned(_finished(drawn))]
+    arrived, count = ends.count(Ending.ARRIVED), len(_learned(drawn))
+    finding = f"After {arrived} of {count} runs of RDES and GES the robot reaches the target"
+    return sourced(figure, finding, drawn)
 
 
 def _against_time(
@@ -107,14 +108,3 @@ def _learned(drawn: Evidence) -> list[RunSummary]:
 def _finished(found: Evidence) -> Evidence:
     """Without the runs that had to be stopped, which left no policy."""
     return found.where(found.runs.stopped == Stopped.FINISHED)
-
-
-def _endings(summaries: list[RunSummary]) -> str:
-    """How many rollouts end in which way, the most common first."""
-    ends = Counter(
-        ending(one.states, one.name.task)
-        if one.facts["stopped"] == Stopped.FINISHED
-        else "stopped in training"
-        for one in summaries
-    )
-    return ", ".join(f"{count} {name}" for name, count in ends.most_common())

@@ -4,7 +4,7 @@ Every figure takes the claim's `Verdict`, and its title is the outcome and what 
 is dropped: what was cut short is drawn in the grey strip marked ∞.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Vector
 from nmpcrl.analysis.gradient_td import Curvature
-from nmpcrl.analysis.statistics import Estimate, interquartile_mean
+from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, thresholds
 from nmpcrl.claims.paper_claims import BY_RUNS
@@ -58,18 +58,34 @@ LAYOUT_MARKS = ("o", "s", "^", "D", "v", "P")
 SIZE_MARKS = {"small": ("o", "0.55"), "medium": ("^", "0.3"), "large": ("s", "black")}
 
 
-@page
-def divergence(found: Evidence, verdict: Verdict) -> Figure:
-    """C1: training cost over the frozen arm's, and whether DES diverged where RDES did not."""
-    figure, panel, drawn = _measured(found, verdict)
-    return _finished(figure, panel, verdict, "DES diverged and RDES did not", "pairs", drawn)
+FINDINGS = {  # what holds in each run or pair of runs that says yes
+    "C1": ("DES diverged and RDES did not", "pairs"),
+    "C2": ("ES was unstable and GES was not", "pairs"),
+    "C6": (
+        "with θ as an input, the network's error is at most"
+        f" {thresholds.MORE_ACCURATE} times as large",
+        "runs",
+    ),
+    "C9": (f"learning reduces the cost by {thresholds.BETTER:.0%} or more", "runs"),
+}
 
 
 @page
-def instability(found: Evidence, verdict: Verdict) -> Figure:
-    """C2: range of the noise-free cost, and whether ES was unstable where GES was not."""
-    figure, panel, drawn = _measured(found, verdict)
-    return _finished(figure, panel, verdict, "ES was unstable and GES was not", "pairs", drawn)
+def measured(found: Evidence, verdict: Verdict) -> Figure:
+    """A claim of `FINDINGS`: its measure in every run, and in what share it holds.
+
+    The share by which learning reduces the cost may be minus infinity, so C9 is drawn by what is
+    left of the cost.
+    """
+    claim = BY_RUNS[verdict.claim]
+    values, border, label = claim.measure(found.runs, found.paths), claim.threshold, claim.label
+    if verdict.claim == "C9":
+        values, border, label = 1 - values, 1 - border, "noise-free cost, end / start"
+    figure, (axis, panel) = _panels()
+    strips(axis, values, border)
+    axis.set_ylabel(label)
+    drawn = part(found, tuple(values))
+    return _finished(figure, panel, verdict, *FINDINGS[verdict.claim], drawn)
 
 
 @page
@@ -117,15 +133,6 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
     below(figure, [Line2D([], [], label=name, **_layout_mark(name)) for name in names])
     finding = "RDES and GES end in the same policy"
     return _finished(figure, axes[-1], verdict, finding, "pairs", drawn)
-
-
-@page
-def held_out(found: Evidence, verdict: Verdict) -> Figure:
-    """C6: the network's error on held-out pairs with theta as an input, over that without."""
-    figure, panel, drawn = _measured(found, verdict)
-    limit = thresholds.MORE_ACCURATE
-    finding = f"with θ as an input, the network's error is at most {limit} times as large"
-    return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
 @page
@@ -177,15 +184,7 @@ def theorem(
 
 
 @page
-def gains(found: Evidence, verdict: Verdict) -> Figure:
-    """C9: noise-free cost at the end over that at the start, of RDES and GES."""
-    figure, panel, drawn = _measured(found, verdict, left=True)
-    finding = f"learning reduces the cost by {thresholds.BETTER:.0%} or more"
-    return _finished(figure, panel, verdict, finding, "runs", drawn)
-
-
-@page
-def learners(found: Evidence) -> Figure:
+def learners(found: Evidence, finding: str) -> Figure:
     """All learners: interquartile mean of the final cost, and how many runs save how much."""
     figure, (middles, profile) = subplots(1, 2, across=1, tall=5.4)
     costs = {name: _final_costs(found, name) for name in found.summaries.values_of("learner")}
@@ -206,45 +205,13 @@ def learners(found: Evidence) -> Figure:
     )
     profile.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
     below(figure, *profile.get_legend_handles_labels())
-    medians = {name: float(np.median(cost)) for name, (cost, _) in costs.items()}
-    return marked(headed(figure, lowest(means, medians)), found.mark)
-
-
-def lowest(means: Mapping[str, Estimate], medians: Mapping[str, float]) -> str:
-    """Which learner ends lowest, by the interquartile mean and by the median.
-
-    Args:
-        means: interquartile mean of the final cost over the start's, by learner.
-        medians: its median, by learner.
-    """
-    best = min(means, key=lambda name: means[name].value)
-    middle = min(medians, key=lambda name: medians[name])
-    if best == middle:
-        return f"{best} ends lowest, by the interquartile mean and by the median"
-    return f"{best} ends lowest by the interquartile mean, {middle} by the median"
+    return marked(headed(figure, finding), found.mark)
 
 
 def _panels(measured: int = 1) -> tuple[Figure, Column]:
     """Room for what was measured, and a narrower panel for the share of yes."""
     widths = (2.6 / measured,) * measured + (1,)
     return subplots(1, measured + 1, 3.7, width_ratios=widths, tall=1.3 + 2.3 * (measured + 1))
-
-
-def _measured(
-    found: Evidence, verdict: Verdict, *, left: bool = False
-) -> tuple[Figure, Axes, Evidence]:
-    """A figure with the claim's measure drawn, its panel for the shares, and whose runs it has.
-
-    A share by which the cost is reduced may be minus infinity; what is left of the cost is not.
-    """
-    claim = BY_RUNS[verdict.claim]
-    values, border, label = claim.measure(found.runs, found.paths), claim.threshold, claim.label
-    if left:
-        values, border, label = 1 - values, 1 - border, "noise-free cost, end / start"
-    figure, (measured, panel) = _panels()
-    strips(measured, values, border)
-    measured.set_ylabel(label)
-    return figure, panel, part(found, tuple(values))
 
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:

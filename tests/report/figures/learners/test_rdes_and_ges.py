@@ -9,7 +9,7 @@ from nmpcrl.analysis.extrapolation import Outcome
 from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
-from nmpcrl.report.figures.learners import few_runs, ges, rdes
+from nmpcrl.report.figures.learners import ges, rdes
 from nmpcrl.study import Experiment, Runs, paper, run, sweep
 
 SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}
@@ -47,8 +47,6 @@ def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(stud
 @pytest.mark.parametrize(
     ("draw", "words"),
     [
-        (few_runs.figure_1, "Divergence: DES in 0 of 2, RDES in 0 of 2 runs"),
-        (few_runs.figure_2, "Instability: ES in"),
         (rdes.online_errors, "the next value is off by"),
         (ges.overshoots, "In the median run, no step of ES or GES is above 2"),
         (ges.corrections, "times as long as δφ"),
@@ -62,13 +60,6 @@ def test_a_figure_of_the_study_says_what_it_found(study, draw, words):
     assert any("[" in axes.get_ylabel() for axes in figure.axes)
 
 
-def test_each_run_has_its_line_in_figure_1(study):
-    figure = few_runs.figure_1(study)
-    lines = [line for line in figure.axes[0].lines if len(line.get_xdata())]
-    assert len(lines) == 3  # DES, RDES and frozen, one seed
-    assert all(len(line.get_xdata()) == SMALL["episodes"] for line in lines)
-
-
 def test_a_run_that_was_stopped_early_can_be_drawn(study):
     full = one(study, "DES")
     steps = {name: column[:60].copy() for name, column in full.steps.items()}
@@ -78,8 +69,6 @@ def test_a_run_that_was_stopped_early_can_be_drawn(study):
     evaluations = {name: column[:1] for name, column in full.evaluations.items()}
     stopped = type(full)(full.experiment, steps, evaluations, {"stopped": "diverged"})
     runs = {e: stopped if r is full else r for e, r in study.items()}
-    figure = few_runs.figure_1(Runs(runs))
-    assert heading(figure).startswith("Divergence: DES in 1 of 2")
     rdes.online_errors(Runs(runs))
 
 
