@@ -70,6 +70,7 @@ def _learning_curves(drawn: Evidence, title: str) -> Figure:
         for axis, decay in zip(axes[k - 1], decays, strict=True):
             _costs(axis, drawn.summaries.select(decay=decay), learners, curve)
             label_panel(axis, decay if k == 1 else "", "episode" if k == len(rows) else "")
+            axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
         axes[k - 1, 0].set_ylabel(label)
     legend(figure, learners)
     return sourced(figure, title, drawn)

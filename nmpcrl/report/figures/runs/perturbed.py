@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Vector
 from nmpcrl.report.figures.axes import label_panel, legend
@@ -30,6 +31,7 @@ def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: flo
         axis.axhline(start, **LIMIT)
         axis.set(yscale="log")
         label_panel(axis, decay)
+        axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
     _plot(axes[0, 0], solvers, color="0.45", linewidth=2.4)
     axes[0, 0].set_ylabel("largest difference in θ")
     learners = tuple(dict.fromkeys(experiment.learner for experiment in perturbed))

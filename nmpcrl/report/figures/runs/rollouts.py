@@ -54,7 +54,7 @@ def maps(found: Evidence) -> Figure:
     """Where the learned policies lead the robot in every layout, both readings of the decay."""
     drawn = part(found, SHOWN)
     layouts = drawn.summaries.values_of("layout")
-    figure, by_layout, grid = map_grid(layouts, 1.95, 1.0)
+    figure, by_layout, grid = map_grid(layouts, 1.95, 1.4)
     for layout, axis in by_layout.items():
         runs = _finished(drawn).summaries.select(layout=layout)
         _map(axis, paper.task(layout), runs)
