@@ -140,28 +140,36 @@ def site() -> Path:
 
 
 @pytest.fixture(scope="session")
-def browser():
-    """A headless Chromium of the distribution."""
-    path = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if path is None:
-        missing(f"none of {', '.join(BROWSERS)} is installed")
+def playwright():
+    """What drives browsers, once for a session."""
     from playwright.sync_api import sync_playwright
 
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=FLAGS.split())
-        yield chromium
-        chromium.close()
+    with sync_playwright() as started:
+        yield started
+
+
+def launched(kind, names: tuple[str, ...], **settings):
+    """A headless browser of the distribution."""
+    path = next(filter(None, map(shutil.which, names)), None)
+    if path is None:
+        missing(f"none of {', '.join(names)} is installed")
+    return kind.launch(executable_path=path, **settings)
 
 
 @pytest.fixture(scope="session")
-def distributed_firefox(tmp_path_factory):
-    """A headless Firefox of the distribution."""
-    import firefox
+def browser(playwright):
+    """A headless Chromium of the distribution."""
+    chromium = launched(playwright.chromium, BROWSERS, args=FLAGS.split())
+    yield chromium
+    chromium.close()
 
-    if firefox.installed() is None:
-        missing(f"none of {', '.join(firefox.COMMANDS)} is installed")
-    with firefox.firefox(tmp_path_factory.mktemp("profile")) as started:
-        yield started
+
+@pytest.fixture(scope="session")
+def distributed_firefox(playwright):
+    """A headless Firefox of the distribution, not of Playwright's own making."""
+    firefox = launched(playwright.firefox, ("firefox-esr", "firefox"), channel="moz-firefox")
+    yield firefox
+    firefox.close()
 
 
 @pytest.fixture(scope="session")

@@ -2,14 +2,13 @@
 
 import functools
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 
 import pytest
 from bs4 import BeautifulSoup
 from filelock import FileLock
-from live_page import Tab
-from visits import EACH_PUSH, PATIENCE, Visit, look_at
+from visits import EACH_PUSH, Visit, look_at
 
 
 @pytest.fixture(scope="session")
@@ -32,42 +31,3 @@ def visit(site, browser, shared) -> Callable[[str], Visit]:
             return Visit(**json.loads(kept.read_text()))
 
     return seen
-
-
-MATHJAX = "**/tex-svg-full.js*"
-AS_TYPED = """document.head.insertAdjacentHTML(
-    "beforeend", "<style>.math { overflow: hidden }</style>")"""
-
-
-@pytest.fixture
-def opened(site, browser) -> Iterator[Callable[..., Tab]]:
-    """Opens the page of a live figure as a reader with these settings would.
-
-    Its formulas are not typeset unless that is asked for: it takes as long as most tests.
-    """
-    contexts = []
-
-    def with_settings(figure, script="", *, chapter=None, formulas=False, **settings):
-        contexts.append(browser.new_context(**settings))
-        contexts[-1].set_default_timeout(PATIENCE)
-        if not formulas:
-            contexts[-1].route(
-                MATHJAX, lambda asked: asked.fulfill(content_type="text/javascript", body=AS_TYPED)
-            )
-        page = contexts[-1].new_page()
-        if script:
-            page.add_init_script(script)
-        return Tab(page, site, figure, chapter)
-
-    yield with_settings
-    for context in contexts:
-        context.close()
-
-
-@pytest.fixture
-def tab(opened, request) -> Iterator[Tab]:
-    """The page of a module's FIGURE on a large screen; it has no errors and asks nobody."""
-    tab = opened(request.module.FIGURE, viewport={"width": 1400, "height": 1000}).begun()
-    yield tab
-    assert tab.errors == []
-    assert tab.external() == []

@@ -9,99 +9,176 @@ import numpy as np
 import pytest
 from builders import raising
 
+from nmpcrl.analysis.trajectory import closes_at
+from nmpcrl.claims import published
+from nmpcrl.control import Nmpc
 from nmpcrl.control import browser as alone
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report import live
-from nmpcrl.report.live import closed_loop, frame
-from nmpcrl.study import paper
+from nmpcrl.report.live import frame, published_runs
+from nmpcrl.report.live.learning import MOST, NARROW, WIDE, setting
+from nmpcrl.report.live.problem import problem_of
+from nmpcrl.study import Experiment, ParameterError, design, layouts, paper
 from nmpcrl.study.geometry import MOST_OBSTACLES
 
 THETA = np.array(paper.THETA_INIT)
+NMPC = paper.nmpc("C", horizon=7)
+FIGURES = {
+    "chain": lambda: live.chain(0.1, 0.4, 0.97),
+    "controller": lambda: live.controller(NMPC, THETA, 130),
+    "gradient": lambda: live.gradient(NMPC, NMPC.task.start, THETA, np.array([1e-6, 1e-4, 1e-2])),
+    "intro": live.intro,
+    "laboratory": live.laboratory,
+    "moving": live.moving,
+    "runs": lambda: live.runs("DES", "RDES"),
+}
+each_figure = pytest.mark.parametrize("figure", FIGURES)
 
 
-@pytest.fixture(scope="module")
-def nmpc():
-    return paper.nmpc("C", horizon=7)
-
-
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def small(monkeypatch) -> None:
     """A module of three bytes."""
-    monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
+    monkeypatch.setattr(browser, "module", lambda *of: b"abc")
 
 
-@pytest.fixture
-def shown(nmpc, small) -> str:
-    """The figure's HTML."""
-    return live.controller(nmpc, THETA, 130).data
-
-
-def given(shown: str) -> dict:
+def given(figure: str) -> dict:
     """What the script is given."""
-    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
+    return json.loads(re.search(r'application/json">(.*)</script>', FIGURES[figure]().data)[1])
 
 
-def test_the_problem_is_the_one_that_the_controller_solves(nmpc, data):
+@each_figure
+def test_the_output_is_whole_and_hidden_until_its_scripts_run(figure):
+    html = FIGURES[figure]().data
+    files = re.findall(r'data-file="([^"]+)"', html)
+    assert files[:2] == [frame.STYLE, frame.MODULE]
+    assert files[-1] == f"{figure}.js"
+    assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", html)
+    assert gzip.decompress(b64decode(re.search(r'nmpcrl, module: "([^"]+)"', html)[1])) == b"abc"
+    assert re.match(rf'<figure class="live" data-figure="{figure}" hidden>\n<p>.* trusted', html)
+
+
+@each_figure
+def test_without_a_compiler_or_scripts_there_is_a_sentence(figure, tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setenv("NMPCRL_LIVE", str(tmp_path / "nowhere"))
+        assert "NMPCRL_LIVE" in FIGURES[figure]().data
+    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
+    said = "<p>There is no live figure here: numba is not installed.</p>"
+    assert FIGURES[figure]().data == said
+
+
+def test_the_problem_is_the_one_that_the_controller_solves():
     """But for the longest horizon and an obstacle, of which a page makes what is asked."""
-    shown, own = data["problem"], alone.problem(nmpc.problem)
+    shown, own = given("controller")["problem"], alone.problem(NMPC.problem)
     for name in ("lower", "upper", "sides", "tie", "states", "inputs", "theta", "tolerance"):
         assert shown[name] == own[name]
     assert shown["discount"][:8] == own["discount"]
     assert [one[:7] for one in shown["drawn"]] == own["drawn"]
-    assert [one[:7] for one in shown["others"]] == own["others"]
     assert shown["weights"] * 4 == own["weights"]
-    assert [shown["target"], *shown["discs"]] == [
-        nmpc.task.target.tolist(),
-        *np.transpose(nmpc.task.discs).tolist(),
-    ]
+    assert shown["discs"] == np.transpose(NMPC.task.discs).tolist()
     assert shown["most_discs"] == MOST_OBSTACLES
+    for active in (False, True):
+        here = Nmpc(NMPC.plant, NMPC.task, horizon=7, ties_active=active)
+        assert problem_of(here)["tie"] == here.ocp.tie
 
 
-def test_each_slider_has_a_step_at_its_first_value(data):
+def test_each_slider_has_a_step_at_its_first_value():
+    data, chain = given("controller"), given("chain")
     first = dict(zip(data["names"], data["theta"], strict=True)) | {"horizon": data["horizon"]}
-    assert set(data["ranges"]) == set(first)
-    for name, (least, most, step) in data["ranges"].items():
-        assert least < first[name] < most
-        steps = (first[name] - least) / step
-        assert steps == pytest.approx(round(steps), abs=1e-9)
+    for values, of in ((first, data["ranges"]), (chain["given"], chain["ranges"])):
+        for name, (least, most, step) in of.items():
+            assert least <= values[name] <= most
+            steps = (values[name] - least) / step
+            assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
-def test_the_map_shows_the_start_the_target_and_every_circle(nmpc, data):
+@pytest.mark.parametrize("figure", ["controller", "intro", "moving", "runs"])
+def test_a_map_shows_every_circle(figure):
+    data = given(figure)
     x, y, width, height = data["view"]
-    low, high = np.array([x, y]), np.array([x + width, y + height])
-    for place in (nmpc.task.start[:2], nmpc.task.target[:2]):
-        assert (low < place).all()
-        assert (place < high).all()
-    for *centre, clearance in data["problem"]["discs"]:
-        assert (low < np.array(centre)).all()
-        assert (np.array(centre) + clearance / 2 < high).all()
+    wide = data.get("layouts", {"here": data["problem"]["discs"]})
+    for cx, cy, clearance in np.concatenate([*wide.values()]):
+        reach = clearance / 2 - 1e-9
+        assert x <= cx - reach < cx + reach <= x + width
+        assert y <= cy - reach < cy + reach <= y + height
 
 
-def test_the_output_is_whole_and_loads_nothing(shown):
-    assert re.findall(r'data-file="([^"]+)"', shown) == [
-        frame.STYLE,
-        frame.MODULE,
-        *closed_loop.SCRIPTS,
+def test_the_introduction_trains_as_the_study_where_a_gap_is_open_and_where_one_closes():
+    data, experiment = given("intro"), Experiment("ES")
+    for name in ("learner", "alpha", "decay", "seed", "episodes", "steps", "horizon"):
+        assert data["settings"][name] == getattr(experiment, name)
+    assert data["settings"]["decayRate"] == experiment.decay_rate
+    assert layouts.screen(paper.LAYOUTS[WIDE]).kind == "open"
+    assert layouts.screen(paper.LAYOUTS[NARROW]).kind == "closing"
+
+
+def test_the_laboratory_allows_what_an_experiment_takes():
+    for field in given("laboratory")["fields"]:
+        name = field["name"]
+        assert field["default"] == getattr(Experiment(), name)
+        if "choices" in field:
+            assert all(Experiment(**{name: one}) for one in field["choices"])
+            continue
+        kind = int if field["whole"] else float
+        assert Experiment(**{name: kind(field["least"])})
+        assert Experiment(**{name: kind(field["most"])})
+        beyond = [field["least"] - 1, *([] if name in MOST else [field["most"] * 2])]
+        for one in beyond:
+            with pytest.raises(ParameterError):
+                Experiment(**{name: kind(one)})
+    assert setting("zeta")["read_by"] == ["DES", "RDES"]
+
+
+def test_the_text_of_the_laboratory_sets_theta_c_to_either_side_of_where_the_gap_closes():
+    page = (frame.ROOT / "book/laboratory.ipynb").read_text()
+    values = [float(one) for one in re.findall(r"theta=[\d.,]*,([\d.]+)", page)]
+    (centres,) = set(re.findall(r"#layout=([-\d.,;]+)", page))
+    assert [[float(x) for x in one.split(",")] for one in centres.split(";")] == [
+        [*one] for one in paper.LAYOUTS["F"]
     ]
-    assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", shown)
-    packed = b64decode(re.search(r'module: "([^"]+)"', shown)[1])
-    assert gzip.decompress(packed) == b"abc"
+    task = paper.task("F")
+    first = evaluate(paper.nmpc("F"), THETA, paper.STEPS)
+    closed, low = values
+    assert low < closes_at(task, first.states[:, :2]) < closed
 
 
-def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
-    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
-    assert live.controller(nmpc, THETA, 130).data == (
-        "<p>There is no live figure here: numba is not installed.</p>"
-    )
+def unpacked(packed: dict) -> dict:
+    """The runs of a page, by (learner, decay, seed): costs of training, costs, and theta."""
+    planes = np.frombuffer(gzip.decompress(b64decode(packed["numbers"])), np.uint8)
+    steps = np.ascontiguousarray(planes.reshape(4, -1).T).view("<u4").ravel()
+    rows = np.cumsum(steps, dtype=np.uint32).view("<f4").reshape(len(packed["runs"]), -1)
+    found = {}
+    for name, row in zip(packed["runs"], rows, strict=True):
+        learner, decay, seed = name.split()
+        training, costs, theta = np.split(row, [300, 331])
+        found[learner, decay, int(seed)] = training, costs, theta.reshape(9, 301).T
+    return found
 
 
-SLIDING = np.array([4.4, 1.9, 0.1])  # near obstacle 3 of layout C, not on it
+def assert_published(runs: dict, layout: str) -> None:
+    known = published.load()
+    for (learner, decay, seed), (training, costs, theta) in runs.items():
+        one = known.summaries[Experiment(learner, layout=layout, decay=decay, seed=seed)]
+        count = len(one.evaluations["cost"])
+        np.testing.assert_array_equal(training, one.episodes["cost"])
+        np.testing.assert_array_equal(costs[:count], one.evaluations["cost"])
+        np.testing.assert_array_equal(theta[::10][:count], one.evaluations["theta"])
+        assert np.isnan(costs[count:]).all()
+        np.testing.assert_array_equal(theta[1:], one.episodes["theta"])
 
 
-def test_the_kinks_boundaries_are_where_the_slack_begins(nmpc, small):
-    data = given(live.kink(nmpc, SLIDING, THETA).data)
-    x, y, _ = nmpc.task.discs
-    for k, radius in enumerate(data["boundaries"]):
-        on_it = np.array([x[k] + radius * np.cos(1.0), y[k] + radius * np.sin(1.0), 0.0])
-        assert nmpc.task.overlap(on_it)[k] == pytest.approx(-THETA[8])
+def test_a_page_is_given_one_seed_and_a_file_has_every_run_of_a_layout():
+    shown = unpacked(given("runs")["given"])
+    learners, decays = ("DES", "RDES", "frozen"), ("step", "episode")
+    assert set(shown) == {(learner, decay, 0) for learner in learners for decay in decays}
+    assert_published(shown, "A")
+    files = published_runs.scripts()
+    assert list(files) == [f"runs_{layout}.js" for layout in design.LAYOUTS]
+    parts = (*design.main_table(), *design.controls())
+    for layout, text in zip(design.LAYOUTS, files.values(), strict=True):
+        runs = unpacked(json.loads(re.search(rf"{layout}: (.*) }};", text)[1]))
+        assert set(runs) == {(e.learner, e.decay, e.seed) for e in parts if e.layout == layout}
+        assert_published(runs, layout)
+    assert sum(map(len, files.values())) < 5e6

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, Obstacle
-from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import LONGEST, problem_of
+from nmpcrl.report.prose import ROOT
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import MOST_OBSTACLES
 
@@ -30,7 +30,7 @@ THETA = np.array(paper.THETA_INIT)
 def test_plans_are_those_of_python(browser, robot_module):
     rng = np.random.default_rng(0)
     page, expected, asked = browser.new_page(), [], []
-    page.add_script_tag(content=(frame.folder() / "solver.js").read_text("utf-8"))
+    page.add_script_tag(content=(ROOT / "book/_static/live/solver.js").read_text("utf-8"))
     for horizon, count in ((10, 4), (1, 2), (20, 0), (7, 16), (LONGEST, 1), (10, 4)):
         obstacles = tuple(Obstacle(*rng.uniform([1, -1], [8, 4])) for _ in range(count))
         target = paper.TARGET + rng.uniform(-0.3, 0.3, 3)

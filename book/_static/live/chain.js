@@ -5,9 +5,12 @@
 (() => {
   "use strict";
 
-  const { add, slider, chart, key, player, parts: shared, words: { chain: words } } = window.nmpcrl;
+  const { add, slider, chart, key, player, button, numbers: { fixed, sized }, parts: shared } = window.nmpcrl;
   const PACE = 100; // of an update while it plays [ms]
   const FIRST = 0, SECOND = 1;
+  const SLIDERS = { alpha: "alpha, step size of theta", beta: "beta, step size of w", gamma: "gamma, discount" };
+  const STATES = { first: "in the first state only (off-policy)", both: "in both states in turn (on-policy)" };
+  const KEYS = { ES: "semi-gradient", GES: "gradient TD", delta: "TD error δ", predicted: "prediction wφ" };
   const ERRORS = {
     delta: { color: "var(--ink)", dashes: "" },
     predicted: { color: "var(--plan)", dashes: "5 3" },
@@ -33,8 +36,8 @@
 
   function sliders(parent, { ranges }, read, move) {
     const row = add(parent, "div", { class: "groups" });
-    const all = Object.entries(words.sliders).map(([name, label]) => {
-      const kind = { name, label, range: ranges[name], text: words.number };
+    const all = Object.entries(SLIDERS).map(([name, label]) => {
+      const kind = { name, label, range: ranges[name], text: (value) => fixed(value, 2) };
       return slider(add(row, "div"), kind, {
         read: (given) => given[name],
         write: (number) => move({ [name]: number }),
@@ -45,12 +48,12 @@
 
   function choice(parent, move) {
     const group = add(parent, "fieldset", { class: "options" });
-    add(group, "legend", {}, words.states.legend);
+    add(group, "legend", {}, "Updates are made");
     const row = add(group, "div");
     const all = ["first", "both"].map((value) => {
       const line = add(row, "label");
       const input = add(line, "input", { type: "radio", name: "chain-states", value });
-      add(line, "span", {}, words.states[value]);
+      add(line, "span", {}, STATES[value]);
       input.addEventListener("change", () => move({ states: value }));
       return input;
     });
@@ -59,41 +62,60 @@
 
   // Sizes over the updates on a logarithmic axis: what has happened, and pale what is to come.
   function sizes(parent, { updates, limits }, label, looks) {
-    const one = chart(parent, { label, last: updates });
-    one.title.className = "key";
-    add(one.title, "span", {}, label);
-    for (const [name, look] of Object.entries(looks)) key(one.title, words.keys[name], look);
-    const log = (number) => Math.log10(Math.abs(number));
-    const range = limits.map(log);
-    return (at, lines) => {
-      const drawn = Object.entries(lines).flatMap(([name, numbers]) => {
-        const look = looks[name];
-        const points = numbers.map((number, k) => [k, log(number)]);
-        return [{ points, look: { ...look, pale: true } }, { points: points.slice(0, at + 1), look }];
+    const one = chart(parent, { label });
+    one.head.className = "key caption";
+    for (const [name, look] of Object.entries(looks)) key(one.head, KEYS[name], look);
+    return (at, numbers) => {
+      const lines = Object.entries(numbers).flatMap(([name, sizes]) => {
+        const look = looks[name], points = sizes.map((size, k) => [k, size || NaN]);
+        return [{ ...look, points, pale: true }, { ...look, points: points.slice(0, at + 1) }];
       });
-      one.draw(drawn, range, words.power);
-      one.point(at);
+      one.draw({ x: [0, updates], y: limits, logs: "y", lines, cursor: at, across: "updates" });
     };
   }
+
+  // Lines of texts and numbers in turn.
+  const results = ({ ES, GES }, { alpha, beta, at }) => [
+    [
+      "Semi-gradient: θ =", sized(ES[at].theta), "; value of the state that is updated next", sized(ES[at].value),
+      "; its target", sized(ES[at].target), "; δ =", sized(ES[at].delta),
+    ],
+    [
+      "Gradient TD: θ =", sized(GES[at].theta), "; w =", sized(GES[at].w), "; value", sized(GES[at].value),
+      "; target", sized(GES[at].target), "; δ =", sized(GES[at].delta), "; predicted: wφ =", sized(GES[at].predicted),
+    ],
+    [
+      `After ${ES.length - 1} updates, with β / α =`, fixed(beta / alpha, 2), "; θ of the semi-gradient",
+      sized(ES.at(-1).theta), "; of gradient TD", sized(GES.at(-1).theta),
+    ],
+  ];
 
   function build(figure, data, { rules }) {
     const begin = data.given;
     const { read, move } = shared.state(begin, show);
-    shared.heading(figure, words);
+    shared.heading(figure, {
+      label: "The chain of two states, whose step sizes and discount can be moved",
+      title: "Try it: the chain, updated in your browser by the functions that train the robot.",
+      hint: "Move the sliders by mouse, finger or arrow keys. Press Step for one update, or Play for all.",
+    });
     const parts = [choice(figure, move), sliders(figure, data, read, move)];
-    const moved = { label: words.slider, last: data.updates, pace: PACE, text: words.after, steps: true };
+    const moved = { 
+      label: "Updates made", last: data.updates, pace: PACE, steps: true,
+      text: (updates) => `after ${updates} update${updates === 1 ? "" : "s"}`,
+     };
     const playing = player(figure, moved, {
       read: () => read().at,
       write: (at) => move({ at }),
     });
     const row = add(figure, "div", { class: "costs" });
-    const thetas = sizes(row, data, words.charts.theta, data.looks);
-    const errors = sizes(row, data, words.charts.error, ERRORS);
-    add(figure, "p", { class: "legend" }, words.legend);
+    const thetas = sizes(row, data, "|θ| over the updates:", data.looks);
+    const errors = sizes(row, data, "Gradient TD, in absolute value:", ERRORS);
+    add(figure, "p", { class: "legend" }, "Logarithmic axes: a dip is a change of sign; a line that leaves an axis goes on "
+      + "beyond it. Pale: what is still to come.");
     const say = shared.results(figure);
     const last = add(figure, "div", { class: "last" });
-    add(last, "p", {}, words.question);
-    shared.button(last, words.reset, () => {
+    add(last, "p", {}, "How small may β be before gradient TD diverges, too? And what changes with updates in both states?");
+    button(last, "Reset all", () => {
       playing.stop();
       move(begin);
     });
@@ -105,7 +127,7 @@
       errors(given.at, { delta: all(GES, "delta"), predicted: all(GES, "predicted") });
       playing.draw(given.at);
       for (const draw of parts) draw(given);
-      say(words.results({ ES, GES }, given));
+      say(results({ ES, GES }, given));
       figure.shown = { given, found: { ES, GES } }; // for whoever asks; tests do
     }
     show(begin);

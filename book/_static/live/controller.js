@@ -2,8 +2,13 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, mapParts, slider, weight, parts: shared, words: { controller: words } } = window.nmpcrl;
-  const { points } = shared;
+  const { add, set, plane, mapParts, slider, weight, button, numbers: { points, fixed }, parts: shared } = window.nmpcrl;
+  const GROUPS = {
+    "On the way": ["x", "y", "heading"],
+    Inputs: ["v", "nu"],
+    "At the end": ["x_f", "y_f", "heading_f"],
+    "Constraint, horizon": ["c", "horizon"],
+  };
 
   // The parts of V. It is quadratic in each weight, so a weight's part is half its product with its feature.
   function shares({ theta }, { value, features }) {
@@ -20,7 +25,7 @@
   }
 
   function horizon(group, { ranges: { horizon: range } }, move) {
-    const kind = { name: "horizon", label: words.horizon, range, text: String };
+    const kind = { name: "horizon", label: "N, steps planned", range, text: String };
     return slider(group, kind, {
       read: (given) => given.horizon,
       write: (number) => move({ horizon: number }),
@@ -29,7 +34,7 @@
 
   function sliders(parent, data, read, move) {
     const row = add(parent, "div", { class: "groups" });
-    const all = Object.entries(words.groups).flatMap(([legend, names]) => {
+    const all = Object.entries(GROUPS).flatMap(([legend, names]) => {
       const group = add(row, "fieldset");
       add(group, "legend", {}, legend);
       return names.map((name) => (
@@ -39,32 +44,46 @@
     return (given) => all.forEach((draw) => draw(given));
   }
 
-  function questions(parent, reset) {
-    const last = add(parent, "div", { class: "last" });
-    shared.write(add(last, "p"), words.questions);
-    shared.button(last, words.reset, reset);
-  }
+  // Lines of texts and numbers in turn.
+  const results = ({ plan, parts, cost }) => [
+    [
+      "Value V of the plan:", fixed(plan.value, 1), "= on the way", fixed(parts.stages, 1),
+      "+ inputs", fixed(parts.inputs, 1), "+ at the end", fixed(parts.end, 1), "+ slacks", fixed(parts.slacks, 1),
+    ],
+    [
+      "First action:", `${fixed(plan.action[0], 2)} m/s, ${fixed(plan.action[1], 2)} rad/s`,
+      "; largest slack:", fixed(plan.slack, 3), "; cost of the closed loop:", fixed(cost, 1),
+    ],
+  ];
 
   function build(figure, data, { rollout }) {
     const begin = { start: data.start, theta: data.theta, horizon: data.horizon, discs: data.problem.discs };
     const { read, move } = shared.state(begin, show);
-    shared.heading(figure, words);
-    const map = plane(figure, data.view, words.handles);
+    shared.heading(figure, {
+      label: "Map of the robot, its plan, its closed loop and the obstacles, which can be moved",
+      title: "Try it: the controller of this chapter, solved in your browser.",
+      hint: "Drag the robot, the tip of its arrow or an obstacle; or click one and then its new place; "
+        + "or reach it with Tab and press the arrow keys, with Shift for larger steps.",
+    });
+    const map = plane(figure, data.view, "What can be moved on the map");
     mapParts.background(map, data);
     const parts = [
       ...mapParts.handles(map, data, read, move),
       closedLoop(map, rollout(begin, data.steps)),
       mapParts.planned(map, data),
     ];
-    add(figure, "p", { class: "legend" }, words.legend(data.steps));
+    add(figure, "p", { class: "legend" }, `Thin line: closed loop of ${data.steps} steps, without noise. `
+      + "Thick line: first plan, a dot for each step. Dotted line: closed loop before any change.");
     const tell = shared.results(figure);
     parts.push(sliders(figure, data, read, move));
-    questions(figure, () => move(begin));
+    const last = add(figure, "div", { class: "last" });
+    shared.write(add(last, "p"), "What does {c} do to the distance from the obstacles? What does the robot miss with a smaller {horizon}?");
+    button(last, "Reset all", () => move(begin));
 
     function show(given) {
       const found = rollout(given, data.steps);
       if (found.plan) found.parts = shares(given, found.plan);
-      tell(found.failed ? [[words.failed(found.states.length)]] : words.results(found));
+      tell(found.failed ? [[`The solver found no plan at step ${found.states.length}; the closed loop ends there.`]] : results(found));
       for (const draw of parts) draw(given, found);
       figure.shown = { given, found }; // for whoever asks; tests do
     }

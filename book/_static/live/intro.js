@@ -5,8 +5,8 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, mapParts, trainer, parts: shared, words: { intro: words } } = window.nmpcrl;
-  const { points } = shared;
+  const { add, set, plane, mapParts, trainer, button, numbers: { points, fixed }, parts: shared } = window.nmpcrl;
+  const SAME = 5e-4; // a share of the cost that is called none
 
   // The distance of each obstacle's centre at which the tightened constraint is met, as `problem.boundaries` has it.
   const kept = ([, , clearance], theta) => (clearance / 2) * Math.sqrt(Math.max(0, 1 + theta.at(-1)));
@@ -30,15 +30,36 @@
     };
   }
 
+  function change(before, now) {
+    const share = 1 - now / before, percent = `${fixed(100 * Math.abs(share), 1)} %`;
+    if (!Number.isFinite(share)) return "";
+    return Math.abs(share) < SAME ? "as much as" : `${percent} ${share > 0 ? "less" : "more"} than`;
+  }
+
+  function does({ failed, arrived, states }) {
+    if (failed) return `has no plan at step ${states.length}`;
+    return arrived ? "arrives" : "is stuck before the target";
+  }
+
+  // Texts and numbers in turn.
+  function results({ episode, learning, moved }, episodes, { first, now }) {
+    const cost = now.failed ? [] : ["; cost:", fixed(now.cost, 0)];
+    if (!episode && !learning) return ["Before learning, the robot", does(now), ...cost];
+    const when = learning ? `Episode ${episode} of ${episodes}` : `After ${episode} episodes`;
+    const where = moved ? ", and moved since: the robot" : ": the robot", than = change(first.cost, now.cost);
+    const beside = than ? [`; ${than} before learning`, `(${fixed(first.cost, 0)})`] : [];
+    return [`${when}${where}`, does(now), ...cost, ...beside];
+  }
+
   function buttons(parent, { episodes }, { learn, toggle }) {
     const row = add(parent, "div", { class: "buttons" });
-    const start = shared.button(row, words.learn, learn);
+    const start = button(row, "Learn", learn);
     set(start, { class: "main" });
-    const gap = shared.button(row, words.narrow, toggle);
-    const bar = add(row, "progress", { "aria-label": words.progress, max: episodes, value: 0 });
+    const gap = button(row, "Narrow a gap", toggle);
+    const bar = add(row, "progress", { "aria-label": "Episodes learned", max: episodes, value: 0 });
     return ({ learning, narrow, episode }) => {
-      start.textContent = learning ? words.stop : words.learn;
-      gap.textContent = narrow ? words.widen : words.narrow;
+      start.textContent = learning ? "Stop" : "Learn";
+      gap.textContent = narrow ? "Widen it again" : "Narrow a gap";
       set(bar, { value: episode });
       bar.style.visibility = learning ? "visible" : "hidden";
     };
@@ -85,23 +106,25 @@
       const { start, discs, horizon } = read();
       move({ ...fresh, learning: true });
       const given = {
-        module: window.nmpcrl.module, problem: data.problem, widths: data.widths,
+        module: window.nmpcrl.module, problem: data.problem,
         settings: { ...settings, start, discs, horizon },
       };
       const stop = trainer(given, {
         row: ({ episode, theta, diverged }) => {
           if (stopped !== stop) return; // what was on its way when it was stopped
-          move(diverged ? { episode, said: words.diverged } : { episode, theta });
+          move(diverged ? { episode, said: "Learning diverged." } : { episode, theta });
         },
-        end: (why) => { if (stopped === stop) end(why ? { said: words.failed(why) } : {}); },
+        end: (why) => { if (stopped === stop) end(why ? { said: `This browser could not train: ${why}.` } : {}); },
       });
       stopped = stop;
     }
 
-    set(figure, { "aria-label": words.map });
-    add(figure, "p", { class: "title" }, words.title);
+    shared.heading(figure, {
+      label: "The robot, its trajectory among obstacles that can be moved, and a learner",
+      title: "Drag an obstacle, or press Learn; then narrow a gap, and learn again.",
+    });
     const drawButtons = buttons(figure, settings, { learn, toggle });
-    const map = plane(figure, data.view, words.handles);
+    const map = plane(figure, data.view, "What can be moved on the map");
     mapParts.background(map, data);
     const drawn = [
       circles(map, { discs: layouts.wide }),
@@ -110,15 +133,16 @@
     ];
     mapParts.target(map, data);
     const tell = shared.results(figure);
-    add(figure, "p", { class: "legend" }, words.legend);
+    add(figure, "p", { class: "legend" }, "Line: the robot’s trajectory without noise; dotted: before learning. Dashed circles: "
+      + "the distance from an obstacle that its plans keep, which learning changes; where two overlap, the gap between them is "
+      + "closed. By keyboard: Tab to an obstacle, to the robot or to its arrow, then arrow keys, with Shift for larger steps.");
 
     function show(given) {
       const place = JSON.stringify([given.start, given.discs]);
       if (place !== seen) first = judge(nmpc, data, given, init);
       seen = place;
       const now = given.theta === init ? first : judge(nmpc, data, given, given.theta);
-      const lines = words.now({ ...given, episodes: settings.episodes, rollout: now, first });
-      tell(given.said ? [...lines, [given.said]] : lines);
+      tell([results(given, settings.episodes, { first, now }), ...(given.said ? [[given.said]] : [])]);
       drawButtons(given);
       for (const draw of drawn) draw(given, { first, now });
       figure.shown = { given, found: { first, now } }; // for whoever asks; tests do

@@ -1,9 +1,49 @@
-// Algorithm 1 in this page: nmpcrl/learning/loop.py makes each step, compiled with the solver.
+// Algorithm 1 in this page: nmpcrl/learning/loop.py makes each step, compiled with the solver; a worker runs it.
 //
-// `settings`: { learner, alpha, beta, zeta, decay, decayRate, seed, episodes, steps, theta, w, thetaSet,
-// evaluateEvery, start, target, discs, horizon, limits: { absurd, far, patience }, network: { hidden, batch } }; `noise` holds epsilon, shape (episodes, steps, m).
+// `settings`: { learner, alpha, beta, zeta, decay, decayRate, seed, episodes, steps, theta, w, thetaSet, evaluateEvery,
+// start, target, discs, horizon, limits: { absurd, far, patience }, network: { hidden, batch }, deviation }.
 (function learning() {
   "use strict";
+
+  // ---- Random numbers: a seed draws the same ones in every browser, and others than in Python
+
+  // Numbers in [0, 1), of 32 bits (mulberry32).
+  function uniform(seed, stream) {
+    let state = Math.imul(seed + 1, 0x9e3779b1) ^ Math.imul(stream + 1, 0x85ebca6b);
+    return () => {
+      state = (state + 0x6d2b79f5) | 0;
+      let bits = Math.imul(state ^ (state >>> 15), state | 1);
+      bits ^= bits + Math.imul(bits ^ (bits >>> 7), bits | 61);
+      return ((bits ^ (bits >>> 14)) >>> 0) / 2 ** 32;
+    };
+  }
+
+  // Numbers of the standard normal law (Box and Muller).
+  function normal(seed, count) {
+    const draw = uniform(seed, 0);
+    return Float64Array.from({ length: count }, () => (
+      Math.sqrt(-2 * Math.log(1 - draw())) * Math.cos(2 * Math.PI * draw())
+    ));
+  }
+
+  // The arguments that `learn` takes of a network, as nmpcrl/learning/network.py begins it: `hidden` neurons in each of
+  // two layers, `batch` examples a fit, `capacity` examples in all. `filled` puts numbers in the memory of a module.
+  function network(filled, { inputs, hidden, batch, capacity, rate, seed }) {
+    const draw = uniform(seed, 1), within = (bound) => bound * (2 * draw() - 1), widths = [inputs, hidden, hidden, 1];
+    const first = widths.slice(1).flatMap((out, k) => { // a matrix of (in + 1, out), within torch's bound of a linear layer
+      const bound = 1 / Math.sqrt(widths[k]);
+      return Array.from({ length: (widths[k] + 1) * out }, () => within(bound));
+    });
+    const weights = filled(Float32Array, new Float32Array(4 * first.length)); // gradient and moments, too
+    weights.set(first);
+    const examples = filled(Float32Array, new Float32Array(capacity * (inputs + 1)));
+    const order = filled(Int32Array, new Int32Array(capacity));
+    const counts = filled(BigInt64Array, [0n, 0n]), batches = filled(BigUint64Array, [BigInt(Math.floor(draw() * 2 ** 32))]);
+    const scales = filled(Float64Array, new Float64Array(inputs + 1).fill(1));
+    const sizes = filled(BigInt64Array, [hidden, batch, capacity, 0].map(BigInt)); // 0: ReLU
+    const arrays = [weights, examples, order, counts, batches, scales].map(({ byteOffset }) => byteOffset);
+    return [...arrays, rate, sizes.byteOffset, inputs, capacity];
+  }
 
   // ---- The learners, in the numbers of loop.py
 
@@ -42,10 +82,10 @@
       limits.absurd, ...first.map(() => least), ...first.map(() => most),
     ]);
     const none = zeros(4).byteOffset; // of a learner without a network
-    const net = bootstrap !== NETWORK ? [...Array(6).fill(none), 0, none, 0, 0] : self.nmpcrl.network(filled, {
-      ...settings.network, inputs: n + m + (withTheta ? d : 0), rate: settings.zeta,
+    const net = bootstrap !== NETWORK ? [...Array(6).fill(none), 0, none, 0, 0] : network(filled, {
+      ...settings.network, seed: settings.seed, inputs: n + m + (withTheta ? d : 0), rate: settings.zeta,
       capacity: settings.episodes * settings.steps,
-    }, self.nmpcrl.generator(settings.seed));
+    });
     const given = { target, discs, horizon }, problemAt = () => nmpc.at(given);
     problemAt();
     const state = zeros(n), theta = numbers(first), w = numbers(firstW), warm = zeros(nmpc.planLength());
@@ -70,77 +110,71 @@
     return step;
   }
 
-  // ---- Training
+  // ---- A run
 
   const COUNTS = { step: (episode, t, steps) => episode * steps + t, episode: (episode) => episode };
-  const squared = (vector) => vector?.reduce((sum, each) => sum + each * each, 0);
   const absurd = ({ theta, w }, limits) => ![...theta, ...w].every((each) => Math.abs(each) <= limits.absurd);
 
-  // Algorithm 1, step by step: { episode, time, state, action, cost, value, features, nextValue, delta, phi2, theta,
-  // w, failed, diverged }, theta and w after the step. What is diverged is the last.
-  function* train(nmpc, settings, noise) {
-    const { limits, steps, decayRate, start } = settings, m = nmpc.problem.lower.length;
-    const step = runIn(nmpc, settings), count = COUNTS[settings.decay];
-    let failures = 0;
-    for (let episode = 0; episode < settings.episodes; episode++) {
-      let failed = false;
-      for (let time = 0; time < steps && !failed; time++) {
-        const scale = decayRate ** count(episode, time, steps), at = (episode * steps + time) * m;
-        const found = step(time ? null : start, noise.slice(at, at + m).map((each) => scale * each));
-        ({ failed } = found);
-        const diverged = absurd(found, limits) || (failed && failures + 1 === limits.patience);
-        yield { episode, time, ...found, phi2: squared(found.features), diverged };
-        if (diverged) return;
-      }
-      failures = failed ? failures + 1 : 0;
-    }
-  }
-
-  // What a policy does without noise: (theta) => { cost, states, value, discounted }, the value and the discounted cost of the start.
-  const judgeOf = (nmpc, { start, target, discs, horizon, steps: count }) => (theta) => {
+  // What a policy does without noise: { cost, states, value, discounted }, the last two of the start.
+  function judge(nmpc, { start, target, discs, horizon, steps: count }, theta) {
     const { states, cost, discounted, plan, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, count);
     const end = failed ? { cost: Infinity, discounted: Infinity } : { cost, discounted };
     return { ...end, states, value: plan?.value ?? NaN };
-  };
-
-  // The account of a run, as nmpcrl/study/run.py has it, fed step by step: what the episode did so far.
-  // { episode, cost, delta (root mean square), alphaPhi2 (the largest), theta, diverged, ended, judged or null }
-  function account(settings, judge) {
-    const { alpha, episodes, evaluateEvery, limits } = settings;
-    let cost = 0, phi2 = 0, squares = 0, count = 0;
-    return (step) => {
-      const { theta, diverged } = step, episode = step.episode + 1;
-      cost += step.cost;
-      phi2 = Math.max(phi2, step.phi2 || 0);
-      if (Number.isFinite(step.delta)) {
-        squares += step.delta ** 2;
-        count += 1;
-      }
-      const row = { episode, cost, delta: Math.sqrt(squares / count), alphaPhi2: alpha * phi2, theta, diverged };
-      const ended = step.failed || diverged || step.time === settings.steps - 1;
-      const due = ended && (episode % evaluateEvery === 0 || episode === episodes);
-      if (ended) cost = phi2 = squares = count = 0;
-      return { ...row, ended, judged: due && !absurd(step, limits) ? judge(theta) : null };
-    };
   }
 
-  // A run: the account of each episode, and before them what theta does at first.
+  // A row an episode, as nmpcrl/study/run.py has it, and one before them: { episode, cost, delta (root mean square),
+  // alphaPhi2 (the largest), theta, diverged, judged or null }. `noise` is of all steps, (episodes, steps, m).
   function* run(nmpc, settings, noise) {
-    const judge = judgeOf(nmpc, settings), accounted = account(settings, judge), { theta } = settings;
-    yield { episode: 0, cost: NaN, delta: NaN, alphaPhi2: NaN, theta, diverged: false, judged: judge(theta) };
-    for (const step of train(nmpc, settings, noise)) {
-      const row = accounted(step);
-      if (row.ended) yield row;
+    const { alpha, episodes, evaluateEvery, limits, steps, decayRate, start } = settings;
+    const step = runIn(nmpc, settings), m = nmpc.problem.lower.length, count = COUNTS[settings.decay];
+    let { theta } = settings, failures = 0, left = false, diverged = false;
+    yield { episode: 0, cost: NaN, delta: NaN, alphaPhi2: NaN, theta, diverged, judged: judge(nmpc, settings, theta) };
+    for (let episode = 1; episode <= episodes && !diverged; episode++) {
+      let cost = 0, phi2 = 0, squares = 0, known = 0, failed = false;
+      for (let time = 0; time < steps && !failed && !diverged; time++) {
+        const scale = decayRate ** count(episode - 1, time, steps), at = ((episode - 1) * steps + time) * m;
+        const found = step(time ? null : start, noise.slice(at, at + m).map((each) => scale * each));
+        ({ theta, failed } = found);
+        cost += found.cost;
+        phi2 = Math.max(phi2, found.features?.reduce((sum, each) => sum + each * each, 0) ?? 0);
+        if (Number.isFinite(found.delta)) [squares, known] = [squares + found.delta ** 2, known + 1];
+        failures = failed ? failures + 1 : failures;
+        left = absurd(found, limits);
+        diverged = left || failures === limits.patience;
+      }
+      if (!failed) failures = 0;
+      const due = !left && (episode % evaluateEvery === 0 || episode === episodes);
+      yield {
+        episode, cost, delta: Math.sqrt(squares / known), alphaPhi2: alpha * phi2, theta, diverged,
+        judged: due ? judge(nmpc, settings, theta) : null,
+      };
     }
   }
 
-  // As nmpcrl/study/records.py has it: the mean of the last rollouts, of which theta's first is never one.
-  function finalCost(costs, last) {
-    const learned = costs.slice(1).slice(-last);
-    return learned.length ? learned.reduce((sum, each) => sum + each, 0) / learned.length : Infinity;
+  // Runs in the worker, which is given { module, problem, settings }.
+  async function work({ module, problem, settings }) {
+    const nmpc = await self.nmpcrl.solver(module, problem);
+    const noise = normal(settings.seed, settings.episodes * settings.steps * problem.lower.length);
+    for (const row of run(nmpc, settings, noise.map((each) => settings.deviation * each))) self.postMessage({ row });
   }
 
-  self.nmpcrl = {
-    ...self.nmpcrl, train, run, account, judgeOf, finalCost, sources: [...(self.nmpcrl?.sources ?? []), learning],
-  };
+  // Trains in a worker, which has the text of the two scripts, so that the page stays at hand. `on.row` is called after
+  // each episode, `on.end` once, with an error's sentence or "". What comes back stops it.
+  function trainer(given, on) {
+    const listen = `self.onmessage = ({ data }) => self.nmpcrl.work(data)
+      .then(() => self.postMessage({ end: "" }), (error) => self.postMessage({ end: String(error) }));`;
+    const text = [...self.nmpcrl.sources.map((script) => `(${script})();`), listen].join("\n");
+    const place = URL.createObjectURL(new Blob([text], { type: "text/javascript" })), worker = new Worker(place);
+    URL.revokeObjectURL(place);
+    const end = (why) => {
+      worker.terminate();
+      on.end(why);
+    };
+    worker.onmessage = ({ data }) => (data.row ? on.row(data.row) : end(data.end));
+    worker.onerror = ({ message }) => end(message || "it did not start a worker"); // it does not even begin
+    worker.postMessage(given);
+    return () => worker.terminate();
+  }
+
+  self.nmpcrl = { ...self.nmpcrl, run, normal, work, trainer, sources: [...(self.nmpcrl?.sources ?? []), learning] };
 })();

@@ -5,12 +5,14 @@
   "use strict";
 
   const {
-    add, set, plane, mapParts, weight, trace, key, player, solver, parts: shared, words: { moving: words, parts: common },
+    add, set, plane, mapParts, weight, trace, key, player, button, solver, numbers: { points, fixed }, parts: shared,
   } = window.nmpcrl;
   const PACE = 80; // from one step to the next while it plays [ms]
   const AHEAD = 4; // an arrow is as long as the motion in this time [s]
   const FASTEST = 1; // [m/s]
   const KEYS = 0.5; // of a velocity [m/s], for each metre that an arrow key would move a place
+
+  const ROBOTS = { extrapolated: "Extrapolates each velocity", frozen: "Plans as if they stood" };
 
   const at = ([x, y, vx, vy], seconds) => [x + seconds * vx, y + seconds * vy];
 
@@ -54,7 +56,7 @@
     };
     const to = (point) => put(map.inside(point), velocity());
     const disc = map.handle({
-      label: common.obstacle(k + 1), kind: "obstacle", range: map.range, to,
+      label: mapParts.obstacle(k + 1), kind: "obstacle", range: map.range, to,
       by: (dx, dy) => to(now().map((each, a) => each + [dx, dy][a])),
     });
     add(disc.body, "circle", { class: "safety", r: discs[k][2] / 2 });
@@ -66,7 +68,7 @@
     };
     const shaft = add(map.ground, "line", { class: "shaft" });
     const arrow = map.handle({
-      label: words.velocity(k + 1), kind: "heading", range: [0, FASTEST],
+      label: `Obstacle ${k + 1}, velocity`, kind: "heading", range: [0, FASTEST],
       to: (point) => {
         const away = point.map((each, a) => each - now()[a]), size = Math.hypot(...away);
         speed(away.map((each) => (each / size) * Math.max(0, size - radii[k]) / AHEAD));
@@ -78,10 +80,10 @@
       const [x, y] = now(), [vx, vy] = velocity(), angle = Math.atan2(vy, vx), size = Math.hypot(vx, vy);
       const along = (length) => [x + length * Math.cos(angle), y + length * Math.sin(angle)];
       const begin = along(radii[k]), end = along(radii[k] + AHEAD * size);
-      disc.put([x, y], x, common.place(x, y));
+      disc.put([x, y], x, mapParts.place(x, y));
       set(shaft, { x1: begin[0], y1: begin[1], x2: end[0], y2: end[1] });
       set(tip, { transform: `rotate(${(angle * 180) / Math.PI})` });
-      arrow.put(end, size, words.speed(vx, vy));
+      arrow.put(end, size, size ? `${fixed(vx, 2)} m/s in x, ${fixed(vy, 2)} m/s in y` : "stands");
     };
   }
 
@@ -92,15 +94,25 @@
       drawn.replaceChildren();
       for (const [view, { states, plans, inside }] of Object.entries(found)) {
         const look = looks[view], now = Math.min(step, states.length - 1);
-        trace(drawn, "polyline", { points: shared.points(states) }, { ...look, pale: true });
+        trace(drawn, "polyline", { points: points(states) }, { ...look, pale: true });
         if (now < 0) continue;
         const [cx, cy] = states[now], plain = { color: look.color, dashes: "none" };
-        trace(drawn, "polyline", { points: shared.points(states.slice(0, now + 1)), class: "learner way" }, look);
-        trace(drawn, "polyline", { points: shared.points(plans[now]), class: "learner planned" }, plain);
-        trace(drawn, "circle", { cx, cy, r, class: "learner driven" }, plain);
+        trace(drawn, "polyline", { points: points(states.slice(0, now + 1)), }, { ...look, look: "way" });
+        trace(drawn, "polyline", { points: points(plans[now]), }, { ...plain, look: "planned" });
+        trace(drawn, "circle", { cx, cy, r, }, { ...plain, look: "driven" });
         if (inside[now] > (inside[now - 1] ?? 0)) add(drawn, "circle", { cx, cy, r, class: "within" });
       }
     };
+  }
+
+  // A line of texts and numbers in turn.
+  function results(name, { states, costs, inside, failed }, step) {
+    const now = Math.min(step, states.length - 1);
+    if (failed) return [`${name}: the solver found no plan at step ${states.length}, and the episode ends there.`];
+    return [
+      `${name}: cost`, fixed(costs[now], 0), "so far,", fixed(costs.at(-1), 0), "in all; states inside an obstacle:",
+      `${inside[now]}`, "so far,", `${inside.at(-1)}`, "in all",
+    ];
   }
 
   async function build(figure, data, nmpc) {
@@ -108,14 +120,20 @@
     const begin = { movers: data.movers, theta: data.theta, step: data.step };
     const { read, move } = shared.state(begin, show);
     const views = Object.keys(data.looks);
-    shared.heading(figure, words);
-    const map = plane(figure, data.view, words.handles);
+    shared.heading(figure, {
+      label: "Map of two robots among obstacles that move; obstacles and their velocities can be moved",
+      title: "Try it: two robots among obstacles that move, solved in your browser.",
+      hint: "Press Play. Drag an obstacle to where it is at the time shown, and the tip of its arrow, which is as long as "
+        + "its motion in 4 s; with the tip on the disc, it stands. Or reach both with Tab and press the arrow keys, with "
+        + "Shift for larger steps.",
+    });
+    const map = plane(figure, data.view, "What can be moved on the map");
     mapParts.background(map, data);
     mapParts.target(map, data);
     const keys = add(figure, "p", { class: "key" });
-    for (const view of views) key(keys, words.robots[view], data.looks[view]);
+    for (const view of views) key(keys, ROBOTS[view], data.looks[view]);
     const play = player(figure, {
-      label: words.time, last: data.steps - 1, pace: PACE, text: (step) => words.seconds(data.period * step),
+      label: "Time", last: data.steps - 1, pace: PACE, text: (step) => `${fixed(data.period * step, 1)} s`,
     }, { read: () => read().step, write: (step) => move({ step }) });
     const moved = (change) => {
       play.stop();
@@ -126,9 +144,11 @@
     const tell = shared.results(figure);
     const margin = weight(add(figure, "div", { class: "groups" }), "c", data, read, move);
     const last = add(figure, "div", { class: "last" });
-    shared.write(add(last, "p"), words.questions);
-    shared.button(last, words.reset, () => moved(begin));
-    add(figure, "p", { class: "legend" }, words.legend);
+    shared.write(add(last, "p"), "Which {c} keeps the second robot out of every obstacle, and what does it then cost? "
+      + "Shorten the arrow on the left a little: which robot costs less now?");
+    button(last, "Reset all", () => moved(begin));
+    add(figure, "p", { class: "legend" }, "Thin lines: each robot's whole way. Thick lines: the part that is driven. Dots: "
+      + "its plan at the time shown. A robot that is inside an obstacle's dashed circle has a red ring.");
     let asked = null, found = null;
 
     function show(given) {
@@ -140,7 +160,7 @@
       drawRobots(given, found);
       play.draw(given.step);
       margin(given);
-      tell(views.map((view) => words.results(words.robots[view], found[view], given.step)));
+      tell(views.map((view) => results(ROBOTS[view], found[view], given.step)));
       figure.shown = { given, found }; // for whoever asks; tests do
     }
     show(begin);

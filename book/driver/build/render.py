@@ -38,6 +38,12 @@ MOVED = {  # addresses of pages that are no more
 ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{title}</title>
+<script>
+  const page = "{page}", at = location.hash
+    .replace(/^#(reviewers|reproducibility)-/, "#evidence-")
+    .replace(/^#evidence-wrong$/, "#evidence-failed");
+  if (at && !page.includes("#")) location.replace(page + at); // a place on a page that moved whole
+</script>
 <meta http-equiv="refresh" content="0; url={page}"></head>
 <body><a href="{page}">{title}</a></body>
 </html>

@@ -6,25 +6,8 @@ Without scripts a page shows nothing of it, and a notebook that is not trusted, 
 `hidden` out, its sentence.
 """
 
-from nmpcrl.report.live.closed_loop import controller
-from nmpcrl.report.live.expected_sarsa import gradient, kink, update
-from nmpcrl.report.live.introduction import intro
-from nmpcrl.report.live.moving_obstacles import moving
+from nmpcrl.report.live.figures import chain, controller, gradient, moving
+from nmpcrl.report.live.learning import intro, laboratory
 from nmpcrl.report.live.published_runs import runs
-from nmpcrl.report.live.training import laboratory
-from nmpcrl.report.live.two_learners import learners, networks
-from nmpcrl.report.live.two_states import chain
 
-__all__ = [
-    "chain",
-    "controller",
-    "gradient",
-    "intro",
-    "kink",
-    "laboratory",
-    "learners",
-    "moving",
-    "networks",
-    "runs",
-    "update",
-]
+__all__ = ["chain", "controller", "gradient", "intro", "laboratory", "moving", "runs"]

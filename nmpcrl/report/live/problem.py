@@ -1,19 +1,20 @@
-"""What the solver of a live figure is given, and how it is shown: sliders and a map."""
+"""What the solver of a live figure is given, and how it is shown: sliders, a map, lines."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Obstacle, Task, browser
+from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import MOST_OBSTACLES
 
 LONGEST = 20  # steps planned: a longer plan has several minima
-CLOSE = 1.2  # beside the circle of one obstacle, seen close [m]
-WIDE = 2.4  # the map of one obstacle, over its height
 WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's circle [m]
+DASHES = {"-": (), "--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}  # matplotlib's
+WIDTH = 1.6  # of a line, of which dashes are multiples
 
 
 def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
@@ -27,9 +28,14 @@ def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
     longer = task.problem(nmpc.plant, longest, nmpc.gamma, nmpc.slack_weight)
     return browser.problem(longer, ties_active=nmpc.ties_active) | {
         "target": nmpc.task.target.tolist(),
-        "discs": [list(disc) for disc in zip(*nmpc.task.discs, strict=True)],
+        "discs": discs(nmpc.task),
         "most_discs": MOST_OBSTACLES,
     }
+
+
+def discs(task: Task) -> list[list[float]]:
+    """Centre and diameter of each obstacle's clearance, as the solver takes them [m]."""
+    return [list(disc) for disc in zip(*task.discs, strict=True)]
 
 
 def begin(nmpc: Nmpc, state: Vector, theta: Vector) -> dict[str, Any]:
@@ -41,6 +47,7 @@ def begin(nmpc: Nmpc, state: Vector, theta: Vector) -> dict[str, Any]:
         "theta": theta.tolist(),
         "horizon": nmpc.horizon,
         "problem": problem_of(nmpc),
+        "steps": paper.STEPS,
         **surroundings(nmpc.task),
     }
 
@@ -56,36 +63,31 @@ def ranges(theta: Vector) -> dict[str, tuple[float, float, float]]:
     return found | {"horizon": (1, LONGEST, 1)}
 
 
-def surroundings(task: Task) -> dict[str, Any]:
-    """What a map draws besides trajectories: its part of the plane, the box, and sizes [m]."""
+def surroundings(*tasks: Task) -> dict[str, Any]:
+    """What a map of some tasks draws besides trajectories: its part of the plane, the box, sizes.
+
+    The part is least x and y, width and height, and shows start, target and obstacles whole [m].
+    """
+    first, low, high = tasks[0], np.full(2, np.inf), np.full(2, -np.inf)
+    for task in tasks:
+        x, y, clearance = task.discs
+        reach, ends = clearance / 2, np.transpose([task.start[:2], task.target[:2]])
+        low = np.hstack([low[:, None], np.vstack([x - reach, y - reach]), ends]).min(axis=1)
+        high = np.hstack([high[:, None], np.vstack([x + reach, y + reach]), ends]).max(axis=1)
+    low = np.maximum(low - AROUND, first.lower[:2] - WALL)
+    high = np.minimum(high + AROUND, first.upper[:2] + WALL)
     return {
-        "box": [task.lower[:2].tolist(), task.upper[:2].tolist()],
-        "view": view(task),
-        "radii": [one.diameter / 2 for one in task.obstacles],
-        "robot": task.robot_diameter / 2,
+        "box": [first.lower[:2].tolist(), first.upper[:2].tolist()],
+        "view": [*low.tolist(), *(high - low).tolist()],
+        "radii": [one.diameter / 2 for one in first.obstacles],
+        "robot": first.robot_diameter / 2,
     }
 
 
-def view(task: Task) -> list[float]:
-    """The part of the plane that the map shows: least x and y, width and height [m]."""
-    x, y, clearance = task.discs
-    centres, reach = np.column_stack([x, y]), clearance[:, None] / 2 + AROUND
-    ends = np.array([task.start[:2], task.target[:2]])
-    low = np.vstack([centres - reach, ends - AROUND]).min(axis=0)
-    high = np.vstack([centres + reach, ends + AROUND]).max(axis=0)
-    low = np.maximum(low, task.lower[:2] - WALL)
-    high = np.minimum(high, task.upper[:2] + WALL)
-    return [*low.tolist(), *(high - low).tolist()]
-
-
-def boundaries(task: Task, theta_c: float) -> list[float]:
-    """The distance from each obstacle's centre at which Xi + theta_c = 0, by Eq. (19) [m]."""
-    *_, clearance = task.discs
-    return [float(each) / 2 * (1 + theta_c) ** 0.5 for each in clearance]
-
-
-def close(task: Task, state: Vector) -> list[float]:
-    """As `view`, of the obstacle that is nearest to a state."""
-    x, y, clearance = (each[np.argmax(task.overlap(state))] for each in task.discs)
-    height = clearance + CLOSE
-    return [x - WIDE * height / 2, y - height / 2, WIDE * height, height]
+def look(learner: str) -> dict[str, str]:
+    """Colour and dashes of a learner, as in all figures; black follows the theme of the page."""
+    found = asdict(LOOKS[learner])
+    style = found["linestyle"]
+    dashes = DASHES[style] if isinstance(style, str) else style[1]
+    color = "var(--ink)" if found["color"] == "#000000" else found["color"]
+    return {"color": color, "dashes": " ".join(f"{WIDTH * each:g}" for each in dashes)}

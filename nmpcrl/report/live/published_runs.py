@@ -1,4 +1,4 @@
-"""The live figure of chapters 5, 7 and 12: published runs, episode by episode.
+"""The live figure of published runs, episode by episode.
 
 A page is given one seed in one layout; `scripts` are the files that it loads for all others. The
 trajectories are in neither: the page solves them again.
@@ -18,47 +18,42 @@ from nmpcrl.claims import published
 from nmpcrl.claims.published import FOLLOWED, Published
 from nmpcrl.control import Nmpc
 from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
-from nmpcrl.report.live import frame
-from nmpcrl.report.live.looks import look
-from nmpcrl.report.live.problem import problem_of, surroundings, view
+from nmpcrl.report.live.frame import solving
+from nmpcrl.report.live.problem import discs, look, problem_of, surroundings
 from nmpcrl.study import paper
 from nmpcrl.study.design import LAYOUTS, SEEDS
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
 
-SCRIPTS = frame.scripts_of(
-    "runs", *frame.MAP, "sliders.js", "charts.js", "player.js", "published.js"
-)
 LAYOUT, SEED = LAYOUTS[0], SEEDS[0]  # what a page is given
 CHOICES = ("first", "second", "layout", "decay", "seed")
 FILE = "runs_{}.js"
 LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
 
 
-def runs(*learners: str, layout: str = LAYOUT) -> HTML:
-    """Published runs of these learners beside the frozen arm; two of them in a layout at first."""
-    nmpc = paper.nmpc(layout)
-    return frame.solving("runs", nmpc, lambda: _data(nmpc, learners, layout), SCRIPTS)
+def runs(*learners: str) -> HTML:
+    """Published runs beside the baseline without learning; the first two learners are shown."""
+    nmpc = paper.nmpc(LAYOUT)
+    return solving("runs", nmpc, lambda: _data(nmpc, learners))
 
 
-def _data(nmpc: Nmpc, learners: tuple[str, ...], layout: str) -> dict[str, Any]:
+def _data(nmpc: Nmpc, learners: tuple[str, ...]) -> dict[str, Any]:
     known = published.load()
     tasks = {name: paper.task(name) for name in LAYOUTS}
     return {
         "looks": {name: look(name) for name in (*learners, "frozen")},
-        "chosen": dict(zip(CHOICES, (*learners[:2], layout, "step", SEED), strict=True)),
-        "layouts": {name: problem_of(paper.nmpc(name))["discs"] for name in tasks},
+        "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
+        "layouts": {name: discs(task) for name, task in tasks.items()},
         "decays": list(DECAY_TITLES),
         "seeds": SEEDS,
         "episodes": _episodes(known),
         "names": paper.THETA_NAMES,
-        "given": packed(known, layout, SEED, (*learners, "frozen")),
+        "given": packed(known, LAYOUT, SEED, (*learners, "frozen")),
         "start": nmpc.task.start.tolist(),
         "horizon": nmpc.horizon,
         "steps": paper.STEPS,
         "problem": problem_of(nmpc),
-        **surroundings(nmpc.task),
-        "view": _union([view(task) for task in tasks.values()]),
+        **surroundings(*tasks.values()),
     }
 
 
@@ -118,10 +113,3 @@ def _episodes(known: Published) -> list[int]:
     """After which episodes a run that was not stopped was judged."""
     after = known.summaries[Experiment("frozen")].evaluations["episode"]
     return [int(episode) for episode in after]
-
-
-def _union(views: list[list[float]]) -> list[float]:
-    """The part of the plane that holds all of these."""
-    low = np.min([one[:2] for one in views], axis=0)
-    high = np.max([np.add(one[:2], one[2:]) for one in views], axis=0)
-    return [*low.tolist(), *(high - low).tolist()]

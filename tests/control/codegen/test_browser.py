@@ -15,7 +15,7 @@ from nmpcrl.control.codegen import browser
 from nmpcrl.control.codegen.browser import from_texts
 from nmpcrl.control.codegen.browser.link import FUNCTIONS, PAGES
 from nmpcrl.control.solvers import stages
-from nmpcrl.report.live.training import LONGEST
+from nmpcrl.report.live.learning import LONGEST
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import MOST_OBSTACLES
 
