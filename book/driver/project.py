@@ -48,7 +48,9 @@ def from_yaml(name: str) -> Any:
 def pages() -> list[str]:
     """The pages of _toc.yml in their order, without suffix."""
     toc = from_yaml("_toc.yml")
-    return [toc["root"], *(page["file"] for part in toc["parts"] for page in part["chapters"])]
+    chapters = [page for part in toc["parts"] for page in part["chapters"]]
+    each = [one["file"] for page in chapters for one in (page, *page.get("sections", ()))]
+    return [toc["root"], *each]
 
 
 def notebooks() -> dict[str, Path]:

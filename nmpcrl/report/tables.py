@@ -1,18 +1,16 @@
 """Verdicts, assumptions and departures as the book's pages show them: HTML and Markdown text."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields
 from html import escape
 from math import isnan
-from types import MappingProxyType
 
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_THAN, kept_without_noise
-from nmpcrl.claims.published import Published
+from nmpcrl.claims.paper_claims import CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Claim, anew
 from nmpcrl.claims.verdict import (
     NOT,
@@ -24,8 +22,8 @@ from nmpcrl.claims.verdict import (
     Verdict,
 )
 from nmpcrl.report.cited import Cited, cited
-from nmpcrl.report.text import SURE, audit_place, departure_link, listed
-from nmpcrl.report.timing import ratios_at_paper_speed, to_es
+from nmpcrl.report.text import SURE, departure_link, listed
+from nmpcrl.report.timing import to_es
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -73,40 +71,6 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     )
     header = ("The paper claims", "Published", "Runs of this page")
     return html_table(scope, header if others else ("The paper claims", "Here"), rows)
-
-
-def plain_verdict_table(
-    verdicts: Iterable[Verdict], beside: Mapping[str, str] = MappingProxyType({})
-) -> str:
-    """One row a claim of the paper, in HTML: what became of it, and a link to what that rests on.
-
-    Args:
-        verdicts: of `judge`; those on wider claims are left out.
-        beside: what else a claim rests on, of `asides`.
-    """
-    rows = (
-        (
-            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
-            _labelled(v),
-            f'<a href="{audit_place(v.claim)}">{_text(_rests_on(v) + beside.get(v.claim, ""))}</a>',
-        )
-        for v in verdicts
-        if v.claim in CLAIMS
-    )
-    caption = "The claims of the paper, and what became of each in the runs of this book."
-    return html_table(caption, ("The paper claims", "Here", "It rests on"), rows)
-
-
-def asides(found: Published) -> dict[str, str]:
-    """What two verdicts rest on besides: C3 with slower solves, and C7's weaker question."""
-    if not found.rows:
-        return {}
-    kept = kept_without_noise(found.main.runs, BY_RUNS["C7"].learners).kept
-    slow, slowest = ratios_at_paper_speed(found.timings)
-    return {
-        "C3": f", and {slow:.2f} to {slowest:.2f} at the paper's time of a solve",
-        "C7": f"; without noise, the weaker question, in {kept.sum()} of {len(kept)}",
-    }
 
 
 def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
@@ -277,17 +241,6 @@ def _outcome(verdict: Verdict, source: str = PUBLISHED) -> str:
 def _labelled(verdict: Verdict) -> str:
     """What is said of a claim, in the colour of those words or else of its outcome."""
     return _badge(verdict.words, BADGES.get(verdict.words, BADGES[verdict.outcome]))
-
-
-def _rests_on(verdict: Verdict) -> str:
-    """The number behind a verdict, in words."""
-    if verdict.ratio is not None:
-        return f"a step takes {verdict.ratio:.2f} of the time of a step of ES"
-    if "all" in verdict.counts:
-        yes, of = verdict.counts["all"]
-        unit = "pairs of runs" if verdict.unit == "pairs" else verdict.unit
-        return f"held in {yes} of {of} {unit}"
-    return "what the cited theorems assume; no run is needed"
 
 
 def _aside(verdict: Verdict) -> str:
