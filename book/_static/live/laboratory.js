@@ -460,7 +460,10 @@
         if (fragment !== (location.hash.slice(1) || usual)) history.replaceState(null, "", `#${fragment}`);
       }, QUIET);
     }
-    window.addEventListener("hashchange", follow);
+    window.addEventListener("hashchange", () => { // a link of the text below
+      follow();
+      figure.scrollIntoView();
+    });
     show(read());
     drawRuns();
     follow();
