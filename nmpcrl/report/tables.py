@@ -248,12 +248,12 @@ def _aside(verdict: Verdict) -> str:
     if verdict.claim in WIDER_THAN:
         return f"<em>Wider than {WIDER_THAN[verdict.claim]}:</em> "
     implied = verdict.claim in CLAIMS and CLAIMS[verdict.claim].implied
-    return "<em>Taken for granted:</em> " if implied else ""
+    return "<em>Implied:</em> " if implied else ""
 
 
 def _letter(letter: str) -> str:
-    """A link to a departure; the paper is clear about what has none."""
-    return departure_link(letter, letter) if letter else "beside the departures"
+    """A link to an assumption of ours; the paper is clear about what has none."""
+    return departure_link(letter, letter) if letter else "no assumption of ours"
 
 
 def _weighed(variant: str, p: float) -> str:

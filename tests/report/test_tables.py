@@ -76,7 +76,7 @@ def test_what_changes_a_verdict_is_named_by_departure_and_bold_where_it_is_sure(
     )
     table = tables.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], changed)
     first, second = table.splitlines()[2:]
-    by = f"{departure_link('B', 'B')}: **layout E** and layout F<br>beside the departures: N = 5"
+    by = f"{departure_link('B', 'B')}: **layout E** and layout F<br>no assumption of ours: N = 5"
     badge = '<span class="{}">{}</span>'
     assert first.endswith(f" | {badge.format(tables.BADGES[PARTLY], 'partly')} | {by} |")
     assert second.endswith(f" | {badge.format(tables.BADGES[NOT], 'no')} | nothing |")
