@@ -8,11 +8,13 @@ A learner reacts to what its controller knows, and so to false alarms, too.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from statistics import fmean
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import judged
@@ -20,6 +22,7 @@ from nmpcrl.analysis.suite import entry, judge
 from nmpcrl.claims.investigation import Row
 from nmpcrl.control import Nmpc
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, expected_sarsa, train
+from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.training import absurd
 from nmpcrl.studies.worlds_run import THETA, controller, exploration, row
 from nmpcrl.study import Experiment, paper
@@ -59,18 +62,33 @@ def fires(values: Sequence[float]) -> bool:
     return not abs(value - np.mean(before)) <= LIMIT * np.std(before, ddof=1)
 
 
-class Recent(np.random.Generator):
-    """A generator for replay that draws late examples most often.
+class Recent(QNetwork):
+    """A network in the weights and examples of another, fitted to late examples most often.
 
-    Without replacement, with weights exp(-age / `AGE`), by the largest of Gumbel's keys.
+    A mini-batch is drawn without replacement, with weights exp(-age / `AGE`), by the largest of
+    Gumbel's keys.
     """
 
-    def choice(self, a: Any, size: Any = None, *args: Any, **options: Any) -> Any:
-        """Numbers of `size` examples among `a`; the last is the latest."""
-        first = max(int(a) - int(8 * AGE), 0)  # weights below exp(-8) are nothing
-        ages = np.arange(int(a) - first)[::-1]
-        keys = self.gumbel(size=ages.size) - ages / AGE
-        return first + np.argpartition(keys, -size)[-size:]
+    def __init__(self, network: QNetwork, rng: np.random.Generator) -> None:
+        self.net, self._rng = network.net, rng
+
+    def draw(self) -> NDArray[np.intp]:
+        """The numbers of the examples of a mini-batch; the last is the latest."""
+        first = max(len(self) - int(8 * AGE), 0)  # weights below exp(-8) are nothing
+        ages = np.arange(len(self) - first)[::-1]
+        keys = self._rng.gumbel(size=ages.size) - ages / AGE
+        return first + np.argpartition(keys, -paper.BATCH)[-paper.BATCH :]
+
+    def fit(self) -> float:
+        """One Adam step on a mini-batch of `draw`; its loss before the step."""
+        weights, examples, _, counts, *rest = self.net
+        drawn = QNetwork.__new__(QNetwork)
+        few = np.array([paper.BATCH, counts[1]])
+        order = np.arange(paper.BATCH, dtype=np.int32)
+        drawn.net = (weights, examples[self.draw()], order, few, *rest)
+        loss = drawn.fit()
+        counts[1] = few[1]
+        return loss
 
 
 def changing(
@@ -122,8 +140,12 @@ def shifting(rate: str, setting: tuple[str, ...], place: str, episodes: int, see
     kind, knows, reaction = setting
     nmpc, layouts = controller(), [still(JUDGE[name]) for name in names]
     initial = [judged(nmpc, THETA, World(each)).cost for each in layouts]
-    rng = (Recent if reaction == "recent" else np.random.Generator)(np.random.PCG64([seed, 3]))
+    rng = np.random.default_rng([seed, 3])
     learner = LEARNERS[kind].make(Experiment(), nmpc, Generators(rng, rng, rng))
+    if reaction == "recent":
+        imitation: Any = learner.bootstrap
+        late = Recent(imitation.network, rng)
+        learner = replace(learner, bootstrap=replace(imitation, network=late))
     raised = expected_sarsa(nmpc, RAISED * paper.ALPHA) if reaction == "raised" else None
     series, events, arrived = [], [], False
     followed = changing(nmpc, layouts, order, learner, exploration(episodes, seed),

@@ -1,10 +1,13 @@
 """Layouts that change: when, what a chart notices, and what a learner then does."""
 
+from copy import copy
+
 import numpy as np
 import pytest
 from scipy.stats import t
 
 from nmpcrl.learning import Diverged, Exploration
+from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.training import Step
 from nmpcrl.studies import shifts
 from nmpcrl.studies.shifts import EVERY, FOR, LIMIT, RAISED, WINDOW, fires, sequence, shifting
@@ -42,12 +45,36 @@ def test_a_chart_fires_on_a_jump_either_way_and_on_nan_once_its_window_is_full(l
     assert not fires([*STEADY[: WINDOW - 1], last])
 
 
+def network_of(examples):
+    network = QNetwork(1, RNG(1))
+    for i in range(examples):
+        network.remember(np.array([i / examples]), float(i > examples / 2))
+    return network, shifts.Recent(copy(network), RNG(0))
+
+
 def test_a_replay_that_prefers_what_is_late_draws_no_example_twice():
-    rng = shifts.Recent(np.random.PCG64(0))
-    drawn = np.array([rng.choice(20_000, 128, replace=False) for _ in range(200)])
+    _, late = network_of(20_000)
+    drawn = np.array([late.draw() for _ in range(200)])
     assert all(len({*row}) == 128 for row in drawn.tolist())
     assert (19_999 - drawn).mean() == pytest.approx(shifts.AGE, rel=0.15)
-    assert {*rng.choice(128, 128, replace=False).tolist()} == {*range(128)}
+
+
+def test_a_late_replay_fits_what_a_uniform_one_does_where_there_is_one_batch_and_late_ones_else():
+    network, late = network_of(128)
+    assert [late.fit() for _ in range(5)] == pytest.approx([network.fit() for _ in range(5)])
+    assert late.weights == pytest.approx(network.weights, abs=1e-6)
+    network, late = network_of(20_000)
+    for _ in range(50):
+        network.fit(), late.fit()
+    middle = np.array([0.3])
+    assert late.predict(middle) > network.predict(middle) + 0.2  # late targets are 1
+
+
+def test_a_late_replay_changes_what_a_network_learns():
+    plain, recent = (
+        shifting("once", ("RDES", "told", one), "S01", 2 * EVERY, 0) for one in ("plain", "recent")
+    )
+    assert plain["series"][-1] != recent["series"][-1]
 
 
 @pytest.fixture
