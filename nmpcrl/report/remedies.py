@@ -1,4 +1,4 @@
-"""What to try where learning fails, as a page shows it: the table of advice, and the answers."""
+"""The comparison of learners, remedies and searches as pages show it: tables, and answers."""
 
 from collections.abc import Iterable, Mapping
 from html import escape
@@ -10,11 +10,9 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims.investigation import WORDS, Answer, Question
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.report.cited import cited
+from nmpcrl.report.cited import Cited, cited
 from nmpcrl.report.tables import BADGES, html_table
-from nmpcrl.report.text import listed
 from nmpcrl.studies.remedies import (
-    ADVICE,
     ADVISED,
     FIRST,
     LATER,
@@ -35,20 +33,20 @@ COLOURS = {  # of a word, as of a verdict
 NOTHING = "–"  # where an entry was not judged
 BACK = "taken back where a rollout got worse"
 COSTS, STEPS, MODEL = "costs of rollouts", "steps", "the plant's derivatives"
-WHAT: dict[str, tuple[str, str]] = {  # what an entry is, after "Try first", and what it is told
-    "frozen": (r"$\boldsymbol{\theta}_\text{init}$ as it is", "nothing"),
-    "grid": (r"a grid over $\theta_c$ alone", COSTS),
+WHAT: dict[str, tuple[str, str]] = {  # what an entry is, and what it is told; in HTML
+    "frozen": ("θ<sub>init</sub> as it is", "nothing"),
+    "grid": ("a grid over θ<sub>c</sub> alone", COSTS),
     "ES": ("Expected Sarsa", STEPS),
     "GES": ("Expected Sarsa by gradient TD", STEPS),
     "TDC": ("exact nonlinear TDC", STEPS),
-    "RDES": (r"Expected Sarsa with a network that is given $\boldsymbol{\theta}$", STEPS),
+    "RDES": ("Expected Sarsa with a network that is given θ", STEPS),
     "DES": ("Expected Sarsa with a network", STEPS),
-    "TDRC": (r"gradient TD with one step size and a $\mathbf{w}$ that decays", STEPS),
-    "GES-3": (r"GES with a faster $\mathbf{w}$, whose steps are normalised", STEPS),
+    "TDRC": ("gradient TD with one step size and a w that decays", STEPS),
+    "GES-3": ("GES with a faster w, whose steps are normalised", STEPS),
     "guarded-ES": ("ES whose steps cannot overshoot", STEPS),
     "guarded-RDES": ("RDES whose steps cannot overshoot", STEPS),
     "control-RDES": ("steps as long as those of guarded RDES in the direction of ES", STEPS),
-    "averaged-ES": (r"the mean $\boldsymbol{\theta}$ of the second half of ES", STEPS),
+    "averaged-ES": ("the mean θ of the second half of ES", STEPS),
     "undone-ES": (f"ES, {BACK}", f"{STEPS}, {COSTS}"),
     "undone-LSTD-Q": (f"Gauss-Newton on the TD error, {BACK}", f"{STEPS}, {COSTS}"),
     "GN-J": ("Gauss-Newton on the cost of the closed loop", f"{STEPS}, {MODEL}"),
@@ -66,34 +64,37 @@ def advice_table(advised: pd.DataFrame, caption: str) -> str:
     """The table of `remedies.advice` in HTML, a row an entry, with evidence and price by budget."""
     judged = (PARTS[part] for part in ADVISED)
     budgets = (f"With {one.episodes} episodes (seeds a layout: {one.seeds})" for one in judged)
-    header = ("Entry", "Try it", *budgets)
+    header = ("Method", "Try it", *budgets)
     cells = (_cells(of_entry) for _, of_entry in advised.groupby("entry", sort=False))
     return html_table(caption, header, cells, headed=True)
 
 
-def entry_table() -> str:
-    """One row an entry, in Markdown: what it is, and what it learns of its episodes."""
-    rows = (f"| `{name}` | {what} | {told} |" for name, (what, told) in WHAT.items())
-    return "\n".join(("| entry | what it is | what it is told |", "|---|---|---|", *rows))
+def evidence(advised: pd.DataFrame, entry: str) -> dict[str, Any]:
+    """What an entry is, and its evidence with the smaller budget, for a sentence."""
+    row = next(advised[(advised.entry == entry) & (advised.part == ADVISED[0])].itertuples())
+    what, _ = WHAT[entry]
+    return {
+        "name": f"`{entry}`", "what": what, "rollouts": str(row.rollouts),
+        "gain": Cited(row.gain, f"share of the possible gain, {entry}, {row.part}: published"),
+        "solved": Cited(row.solved.value, f"layouts solved, {entry}, {row.part}: published"),
+    }  # fmt: skip
 
 
 def named_table(table: pd.DataFrame, part: str) -> str:
-    """One row an entry of a part, in HTML, the control among them; or that nothing is published.
+    """One row an entry of a part with few layouts, in HTML, the control among them.
 
     Args:
         table: of `REMEDIES`.
-        part: with the few layouts that are shown one by one.
+        part: whose layouts are shown one by one.
     """
     found = rows(table[table.part == part])
     order = sorted(found, key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds))
-    if not order:
-        return f"<p>Nothing is published yet of the part <em>{escape(part)}</em>.</p>"
     one = PARTS[part]
     caption = (
         f"Share of the possible gain by layout with {one.episodes} episodes, mean of {one.seeds}"
         " seeds; in italics where not every seed solves the layout."
     )
-    header = ("Entry", *one.places, "Solved", "CPU time")
+    header = ("Method", *one.places, "Solved", "CPU time")
     by = ((row, table[(table.part == part) & (table.entry == row.entry)]) for row in order)
     return html_table(caption, header, (_named(row, runs) for row, runs in by), headed=True)
 
@@ -117,8 +118,9 @@ def _named(row: RemedyRow, runs: pd.DataFrame) -> tuple[str, ...]:
 def _cells(of_entry: pd.DataFrame) -> tuple[str, ...]:
     first, *others = of_entry.itertuples()
     known = {row.part: _evidence(row) for row in (first, *others)}
+    what, told = WHAT[first.entry]
     return (
-        entry_named(first.name),
+        f"{entry_named(first.name)}<br>{what}<br><small>learns from {told}</small>",
         f'<span class="{BADGES[COLOURS[first.word]]}">{first.word}</span>',
         *(known.get(part, NOTHING) for part in ADVISED),
     )
@@ -126,8 +128,11 @@ def _cells(of_entry: pd.DataFrame) -> tuple[str, ...]:
 
 def _evidence(row: Any) -> str:
     """What it gained, and below that how many layouts it solves, and at which price."""
+    of = f"{row.entry}, {row.part}: published"
+    gain = cited(share_shown(row.gain), row.gain, f"share of the possible gain, {of}")
+    well = cited(f"{row.solved.value:.0%} of {row.layouts}", row.solved, f"layouts solved, {of}")
     price = f"{row.rollouts} rollouts, {row.seconds:.1f} s"
-    return f"{_gain(row)}<br><small>{_solved(row)} layouts; {price}</small>"
+    return f"{gain}<br><small>{well} layouts; {price}</small>"
 
 
 def entry_named(name: str) -> str:
@@ -137,42 +142,10 @@ def entry_named(name: str) -> str:
     return f"<code>{escape(entry)}</code>{below}"
 
 
-def _gain(row: Any) -> str:
-    """The share of the possible gain with its interval."""
-    what = f"share of the possible gain, {row.entry}, {row.part}: published"
-    return cited(share_shown(row.gain), row.gain, what)
-
-
 def share_shown(share: Estimate) -> str:
     """With its interval; a quarter of failures or more is infinitely bad."""
     text = f"{share:.2f}" if np.isfinite(share.low) else f"{share.value:.2f} [{share.low:.2f}, …]"
     return text.replace("-0.00", "0.00").replace("-", "−").replace("inf", "∞")
-
-
-def _solved(row: Any) -> str:
-    what = f"layouts solved, {row.entry}, {row.part}: published"
-    return cited(f"{row.solved.value:.0%} of {row.layouts}", row.solved, what)
-
-
-def rule() -> str:
-    """How the words of the table follow from its rows, in Markdown: one item a word."""
-    return "\n".join(f"- **{word}**: {when}." for word, when in ADVICE.items())
-
-
-def in_short(advised: pd.DataFrame) -> str:
-    """The advice in a few sentences: first, second, for whom no run may fail, and never."""
-    rows = {row.entry: row for row in advised.drop_duplicates("entry").itertuples()}
-    by = {word: [row for row in rows.values() if row.word == word] for word in ADVICE}
-    said = ["Nothing that was compared gains by an interval above 0."]
-    for row in by[FIRST]:
-        said = [f"Try first {_tried(row)}, and solves {_solved(row)} layouts."]
-    said += [f"Second, {_tried(row)}." for row in by[SECOND]]
-    if safe := safest(advised):
-        row = rows[safe[0]]
-        said.append(f"If no run may fail, {_tried(row)}, and solves all {row.layouts} layouts.")
-    if by[NEVER]:
-        said.append(f"Never try {listed(f'`{row.entry}`' for row in by[NEVER])}.")
-    return " ".join(said)
 
 
 def safest(advised: pd.DataFrame) -> list[str]:
@@ -180,20 +153,6 @@ def safest(advised: pd.DataFrame) -> list[str]:
     every = advised.solved.map(lambda share: share.value == 1)
     by_entry = every.groupby(advised.entry, sort=False).all()
     return [*by_entry.index[by_entry]]
-
-
-def _tried(row: Any) -> str:
-    what, _ = WHAT[row.entry]
-    saves = f"saves {_gain(row)} of what a long search saves, in {row.rollouts} rollouts"
-    return f"{what} (`{row.entry}`), which {saves}"
-
-
-def expectation_items(expected: Mapping[str, bool]) -> str:
-    """One item a sentence that was expected, in Markdown, and whether it came true."""
-    return "\n".join(
-        f"- Expected: {said}. {'So it is.' if true else 'It is not so.'}"
-        for said, true in expected.items()
-    )
 
 
 def answer_items(

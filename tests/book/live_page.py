@@ -8,10 +8,9 @@ CHAPTERS = {  # of each live figure
     "gradient": "02_expected_sarsa",
     "chain": "04_ges",
     "runs": "05_results",
-    "moving": "changing_world",
+    "moving": "08_changing_world",
     "laboratory": "laboratory",
 }
-ALSO = ("07_beyond",)  # has the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
 MATHJAX = "**/tex-svg-full.js*"

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from live_page import ALSO, CHANGES, CHAPTERS, MOST, Tab, loaded
+from live_page import CHANGES, CHAPTERS, MOST, Tab, loaded
 from visits import assert_figures_pass
 
 from nmpcrl.analysis.encounters import judged
@@ -372,7 +372,7 @@ def test_training_that_fails_says_why(opened):
 
 def test_only_a_page_with_a_live_figure_loads_its_light_scripts(site):
     pages = {path.stem for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
-    assert pages == {*CHAPTERS.values(), *ALSO}
+    assert pages == {*CHAPTERS.values()}
     assert all(loaded(site, figure) <= MOST for figure in CHAPTERS)
 
 

@@ -105,7 +105,7 @@ def test_a_line_of_the_ocp_that_chapter_1_explains_is_marked_in_the_equation():
 
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
-    named = "solver|what_to_try_first|changing_world"
+    named = "solver"
     pages = rf"\d\d_\w+|{named}"
     rows = re.findall(rf"^\| `({pages})` \| (.*) \|$", REPRODUCE, flags=re.M)
     listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}

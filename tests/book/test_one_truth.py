@@ -147,8 +147,8 @@ def test_no_two_numbers_of_one_quantity_differ(html):
         ("03_rdes", "early: the published main table"),
         ("03_rdes", of_steps("RDES", "ipopt")),
         ("06_why_learning_stops", "alone: rollouts of this page"),
-        ("07_beyond", "at margin: the published searches"),
-        ("07_beyond", "by hand: rollouts of this page"),
+        ("07_what_to_try_first", "at margin: the published searches"),
+        ("07_what_to_try_first", "by hand: rollouts of this page"),
         ("intro", "layouts solved by hand: rollouts of this build"),
     ],
 )

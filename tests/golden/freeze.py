@@ -508,13 +508,9 @@ def saved_with_a_wrong_model() -> Any:
 
 @entry("worlds")
 def rows_among_moving_obstacles() -> Any:
-    found = world_report.suite_rows(changing())
-    renamed = {"places": "layouts", "over": "disqualified"}
-    return {
-        plain_name(name): {renamed.get(key, key): value for key, value in row._asdict().items()
-                           if key != "Index"}
-        for name, row in found.items()
-    }  # fmt: skip
+    found = world_report.moving(changing()).rename(columns={"saved": "gain"})
+    return {plain_name(name): row[["clear", "gain", "solved"]].to_dict()
+            for name, row in found.iterrows()}  # fmt: skip
 
 
 @entry("worlds")

@@ -12,7 +12,6 @@ from nmpcrl.report import remedies
 from nmpcrl.report.remedies import (
     advice_table,
     answer_items,
-    in_short,
 )
 from nmpcrl.studies.remedies import (
     ADVISED,
@@ -60,7 +59,7 @@ def test_a_row_has_the_word_the_evidence_and_the_price_in_the_order_of_the_advic
     head, *found = cells(advice_table(advised, "All."))
     assert len(head) == len(found[0])
     assert [one[1] for one in found] == [FIRST, SECOND, LATER, OPEN, NEVER]
-    assert found[0][0] == "CMA-ES|spread=0.1"
+    assert found[0][0].startswith("CMA-ES|spread=0.1|a search of all nine numbers by CMA-ES|")
     assert found[0][2] == "0.80 [0.70, 0.90]|90% of 120| layouts; 49 rollouts, 0.5 s"
     assert found[0][3].startswith("0.99 [0.98, 1.00]|")
     assert found[1][3] == remedies.NOTHING
@@ -89,30 +88,19 @@ def runs():
 def test_a_table_of_a_part_has_each_layout_and_the_greatest_share_first(runs):
     table = remedies.named_table(runs, "named 50")
     head, *found = cells(table)
-    assert head == ["Entry", *"ABCDEF", "Solved", "CPU time"]
+    assert head == ["Method", *"ABCDEF", "Solved", "CPU time"]
     assert found[0] == ["SPSA", *["0.80"] * 6, "6 of 6", "0.5 s"]
     assert found[1] == ["ES", "fails", *["−0.50"] * 5, "0 of 6", "0.5 s"]
     assert found[2][:2] == ["DES", "disqualified"]
     italic = {one.get_text() for one in BeautifulSoup(table, "html.parser").find_all("em")}
     assert italic == {"fails", "−0.50"}
-    said = remedies.named_table(runs, "named 300")
-    assert said == "<p>Nothing is published yet of the part <em>named 300</em>.</p>"
 
 
-def test_the_advice_in_short_names_first_second_and_never_with_evidence(advised):
-    sometimes = advised[advised.word != LATER]
-    said = BeautifulSoup(in_short(sometimes), "html.parser").get_text()
-    assert said == (
-        "Try first a search of all nine numbers by CMA-ES (`CMA-ES`), which saves 0.80 [0.70,"
-        " 0.90] of what a long search saves, in 49 rollouts, and solves 90% of 120 layouts."
-        r" Second, a grid over $\theta_c$ alone (`grid`), which saves 0.70 [0.60, 0.80] of what"
-        " a long search saves, in 49 rollouts. Never try `DPG`."
-    )
-    opened = advised[advised.word == OPEN]
-    assert in_short(opened) == "Nothing that was compared gains by an interval above 0."
-    said = BeautifulSoup(in_short(advised[advised.word != NEVER]), "html.parser").get_text()
-    assert "If no run may fail, steps as long as those of guarded RDES" in said
-    assert said.endswith("in 49 rollouts, and solves all 120 layouts.")
+def test_the_evidence_of_an_entry_is_that_with_the_smaller_budget(advised):
+    found = remedies.evidence(advised, "CMA-ES")
+    assert f"{found['gain'].value:.2f}" == "0.80 [0.70, 0.90]"
+    assert found["solved"].value == pytest.approx(0.9)
+    assert remedies.safest(advised) == ["control-RDES"]
 
 
 GUARD = REMEDIES.asked["guard"]

@@ -5,10 +5,8 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.encounters import Contacts, Encounters
-from nmpcrl.claims.investigation import Answer
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report import worlds
-from nmpcrl.studies.worlds import ORACLES, WORLD_QUESTIONS
+from nmpcrl.studies.worlds import ORACLES, VIEWS
 from nmpcrl.study import paper
 from nmpcrl.study.moving import still
 
@@ -27,17 +25,6 @@ def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a
     assert found.ES["lag"].tolist() == pytest.approx([0.05, 0.05])
 
 
-def test_what_is_not_decided_is_not_listed():
-    names = [one.name for one in WORLD_QUESTIONS]
-    outcomes = (REPRODUCED, REPRODUCED, PARTLY, NOT, UNDECIDABLE)
-    given = [Answer(outcome, {"layouts": (1, 2)}, question=name)
-             for name, outcome in zip(names, outcomes, strict=False)]  # fmt: skip
-    of_another_chapter = Answer(REPRODUCED, {"layouts": (1, 2)}, question="full terminal cost")
-    said = worlds.decided([*given, of_another_chapter])
-    assert said == dict(zip(("asked", "confirmed", "partly", "contradicted"), "5211", strict=True))
-    assert [line[:2] for line in worlds.answered(given).splitlines()] == ["- "] * 4
-
-
 def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_not_touch():
     states = np.zeros((paper.STEPS + 1, 3))
     one = Encounters(states, 0.0, Contacts(0, 0), arrived=False)
@@ -45,19 +32,18 @@ def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_no
     assert worlds.deepest(one, still([(3.0, 0.0)])) == 0
 
 
-def test_the_suites_table_has_a_row_of_each_view_and_policy_that_is_published():
+def test_the_table_of_moving_obstacles_has_a_row_of_each_view_and_policy():
     runs = [
-        {"part": "moving", "arm": f"extrapolated {policy}", "place": place, "k": k, "cost": cost,
+        {"part": "moving", "arm": f"{view} {policy}", "place": place, "k": k, "cost": cost,
          "arrived": True, "inside": k * (policy == "ES"), "seconds": 1.0}
-        for policy, cost in (("init", 100.0), ("ES", 90.0))
+        for view in VIEWS
+        for policy, cost in zip(worlds.ENTRY, (100.0, 90.0, 95.0, 80.0), strict=True)
         for place in ("M01", "M02")
-        for k in range(1 if policy == "init" else 2)
+        for k in range(3 if policy == "ES" else 1)
     ]  # fmt: skip
-    table = pd.DataFrame(runs)
-    found = worlds.suite_rows(table)
-    assert [*found] == [("extrapolated", "init"), ("extrapolated", "ES")]
-    row = found["extrapolated", "ES"]
-    assert (row.entry, row.places, row.solved.value, row.clear.value) == ("ES", 2, 1.0, 0.0)
-    assert row.gain.value == pytest.approx(0.1)
-    assert found["extrapolated", "init"].clear.value == 1.0
-    assert worlds.suite_table(table).count("<tr>") == 3
+    found = worlds.moving(pd.DataFrame(runs))
+    of = found.loc[("extrapolated", "ES")]
+    assert (of.cost.value, of.saved.value) == (pytest.approx(0.9), pytest.approx(0.1))
+    assert (of.solved.value, of.clear.value, of.inside) == (1, 0, (2, 2))
+    assert found.loc[("frozen", "init")].clear.value == 1
+    assert worlds.moving_table(found).count("<tr>") == 1 + len(VIEWS) * len(worlds.ENTRY)

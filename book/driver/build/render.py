@@ -34,6 +34,9 @@ MOVED = {  # addresses of pages that are no more
     "book/for_reviewers": "evidence.html",
     "book/reproducibility": "evidence.html",
     "book/paper_and_book": "departures.html#departures-numbers",
+    **dict.fromkeys(["book/07_beyond", "book/what_to_try_first"], "07_what_to_try_first.html"),
+    "book/the_suite": "07_what_to_try_first.html#first-enter",
+    "book/changing_world": "08_changing_world.html",
 }
 ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">

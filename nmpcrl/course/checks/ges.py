@@ -1,5 +1,7 @@
 """The exercises of Chapter 4."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.two_state import Chain, expected_matrix
 from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.learning.learners import semi_gradient
-from nmpcrl.learning.updates import gradient_td_step
+from nmpcrl.learning.updates import auxiliary_step, curvature_correction, gradient_td_step
 
 
 def factor(answer: Any) -> Outcome:
@@ -24,19 +26,6 @@ def factor(answer: Any) -> Outcome:
             "multiplied?",
             1 - step * (2 * gamma - 1): "Look at the sign of 2 gamma - 1.",
             1 + step * (chain.gamma - 1): "The value of the second state is 2 theta.",
-        },
-    )
-
-
-def ratio(answer: Any) -> Outcome:
-    """Where the trace of the matrix changes its sign, for a tiny alpha."""
-    gamma = 0.9
-    return number(
-        answer,
-        2 * gamma - 1,
-        mistakes={
-            1.0: "A ratio of 1 is enough, but it is not the least one.",
-            gamma: "The next value is 2 theta: 2 gamma, minus 1 for the present one.",
         },
     )
 
@@ -118,3 +107,69 @@ def direction(answer: Any) -> Outcome:
             ),
         },
     )
+
+
+def tdc(answer: Any) -> Outcome:
+    """One update of exact TDC with random features and a random symmetric Hessian."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        vectors = dict(zip(("theta", "w", "phi", "phi_next"), rng.normal(size=(4, 3)), strict=True))
+        half = rng.normal(size=(3, 3))
+        numbers = {"delta": float(rng.normal()), "gamma": float(rng.uniform(0.5, 1))}
+        steps = {"alpha": float(rng.uniform(0.1, 1)), "beta": float(rng.uniform(0.1, 1))}
+        return {**vectors, **numbers, **steps, "hessian": half + half.T}
+
+    def step(
+        theta: Vector,
+        w: Vector,
+        delta: float,
+        phi: Vector,
+        phi_next: Vector,
+        *,
+        hessian: Vector,
+        alpha: float,
+        beta: float,
+        gamma: float,
+        sign: float = -1.0,
+        early: bool = False,
+    ) -> tuple[Vector, Vector]:
+        after = auxiliary_step(w, delta, phi, beta)
+        used = after if early else w
+        h = curvature_correction(delta, phi, used, hessian @ used)
+        moved = gradient_td_step(theta, used, delta, phi, phi_next, alpha=alpha, gamma=gamma)
+        return moved + sign * alpha * h, after
+
+    return function(
+        answer,
+        step,
+        draw,
+        mistakes={
+            "h is subtracted, as Eq. (4.10) has it.": lambda **given: step(**given, sign=1.0),
+            "That is GES: h is missing.": lambda **given: step(**given, sign=0.0),
+            "theta has to move with the old w.": lambda **given: step(**given, early=True),
+        },
+    )
+
+
+def product(answer: Any) -> Outcome:
+    """Gradients of random quartics, and vectors of any length, zero among them."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        half = rng.normal(size=(4, 4))
+        length = rng.choice([0.0, 0.2, 1.0, 5.0])
+        return {
+            "features": partial(_features, half + half.T, rng.normal(size=4)),
+            "theta": rng.normal(size=4),
+            "w": length * rng.normal(size=4),
+        }
+
+    def right(features: Callable[[Vector], Vector], theta: Vector, w: Vector) -> Any:
+        ahead, behind = (features(theta + size * w) for size in (1e-5, -1e-5))
+        return (ahead - behind) / 2e-5
+
+    return function(answer, right, draw, tolerance=1e-4)
+
+
+def _features(matrix: Vector, cubic: Vector, theta: Vector) -> Vector:
+    """The gradient of a quartic; it bends differently in each component."""
+    return matrix @ theta + cubic * theta**3

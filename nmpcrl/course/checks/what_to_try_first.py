@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, behaves, choice, function, number
+from nmpcrl.course import Outcome, behaves, choice, number
 from nmpcrl.course.checks.precision import to_digits
 
 
@@ -39,49 +39,18 @@ def advised(answer: Any) -> Outcome:
     )
 
 
-def tdrc(answer: Any) -> Outcome:
-    """One step of TDRC, theta and w from the old values."""
-
-    def draw(rng: np.random.Generator) -> dict[str, Any]:
-        return {
-            **{name: rng.normal(size=4) for name in ("theta", "w", "phi", "phi_next")},
-            "delta": float(rng.normal()),
-            "alpha": float(rng.uniform(0.01, 0.3)),
-            "gamma": float(rng.uniform(0.8, 0.99)),
-            "kappa": float(rng.uniform(0.5, 3)),
-        }
-
-    return function(
+def matched(answer: Any) -> Outcome:
+    """What a control with the same lengths and other directions rules out."""
+    return choice(
         answer,
-        tdrc_step,
-        draw,
-        mistakes={
-            "w is drawn to 0 by kappa w, so that is subtracted.": lambda **one: tdrc_step(
-                **one | {"kappa": -one["kappa"]}
-            ),
-            "The step size multiplies the decay, too.": lambda **one: tdrc_step(
-                **one | {"kappa": one["kappa"] / one["alpha"]}
-            ),
-            "The correction of theta is discounted by gamma.": lambda **one: tdrc_step(
-                **one | {"gamma": 1.0}
-            ),
+        "b",
+        {
+            "a": "The control does not descend that error, and would do as well.",
+            "b": "the direction was not needed, since the control lacks it and does as well.",
+            "c": "Different directions may end at the same cost.",
+            "d": "The control takes shorter steps where GES does, and not everywhere.",
         },
     )
-
-
-def tdrc_step(
-    theta: Vector,
-    w: Vector,
-    delta: float,
-    phi: Vector,
-    phi_next: Vector,
-    alpha: float,
-    gamma: float,
-    kappa: float,
-) -> tuple[Vector, Vector]:
-    """Theta and w after a step."""
-    moved = theta + alpha * (delta * phi - gamma * (phi @ w) * phi_next)
-    return moved, w + alpha * ((delta - phi @ w) * phi - kappa * w)
 
 
 def undone(answer: Any) -> Outcome:

@@ -26,14 +26,15 @@ from nmpcrl.studies.worlds import VIEWS
 from nmpcrl.study import paper
 from nmpcrl.study.moving import CLEARANCE, PERIOD, TASK, Motion, centres
 
-PANELS = (("known", "extrapolated", "frozen"), ("near",) * 3)
+MAPS = ("extrapolated", "frozen")
+PANELS = (MAPS, ("near",) * 2)
 AROUND = 0.6  # of the map, beyond start and target [m]
 ROOM = 2.0  # of the map, above and below every way [m]
 
 
 @page
 def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
-    """A map for each view, and how near the robot comes to an obstacle.
+    """Maps of two views, and how near the robot comes to an obstacle with all three.
 
     The maps show the moment at which a robot is deepest in an obstacle, or nearest to one.
 
@@ -41,14 +42,14 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
         motions: of the obstacles.
         seen: by view, the episode in which the obstacles were seen so.
     """
-    figure, panels = mosaic(PANELS, (1.6, 1), 4.0)
+    figure, panels = mosaic(PANELS, (1.6, 1), 4.6)
     at = centres(motions, np.arange(paper.STEPS))
     near = {view: nearest(one, motions) for view, one in seen.items()}
     moment = int(np.argmin(near[min(near, key=lambda view: near[view].min())]))
     ways = {view: one.states[: paper.STEPS, :2] for view, one in seen.items()}
     every = np.vstack([*ways.values()])
     low, high = every.min(axis=0) - [AROUND, ROOM], every.max(axis=0) + [AROUND, ROOM]
-    for view in VIEWS:
+    for view in MAPS:
         panels[view].set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         _map(panels[view], at, ways[view], moment, view)
     _curves(figure, panels["near"], near, moment)
@@ -72,7 +73,7 @@ def _map(axes: Axes, at: Matrix, way: Matrix, moment: int, view: str) -> None:
     robot = Circle(way[moment], radius, fc=VIEW_LINES[view]["color"], ec="white", lw=0.8, zorder=4)
     axes.add_patch(robot)
     axes.plot(*TASK.target[:2], "*", color=INK, ms=9, zorder=3)
-    first = view == VIEWS[0]
+    first = view == MAPS[0]
     axes.set(xlabel="x [m]", ylabel="y [m]" if first else "")
     axes.tick_params(labelleft=first)
     axes.set_title(VIEW_TITLES[view], **SUBTITLE)

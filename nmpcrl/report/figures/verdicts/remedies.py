@@ -12,6 +12,7 @@ from matplotlib.ticker import PercentFormatter
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.analysis.suite import Judgement
+from nmpcrl.report.figures.axes import below
 from nmpcrl.report.figures.style import (
     AT_ONE,
     INK,
@@ -24,10 +25,8 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
-from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, SECOND
+from nmpcrl.studies.remedies import ADVISED, PARTS
 
-COLOURS = {FIRST: TEAL, SECOND: TEAL, NEVER: WINE}  # others are in ink
-MARKS = {FIRST: "D", SECOND: "D", NEVER: "X"}  # others are round
 ABOVE: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": "small"}
 LINES = (  # of entries that are no learner of the study
     Look(TEAL, "-", "D"), Look("#B37A00", (0, (6, 2)), "s"), Look("#332288", "-.", "^"),
@@ -38,21 +37,28 @@ LEAST, MOST = -1.0, 1.15  # shares that are drawn; what is lower ends in an arro
 
 
 @page
-def gains(advised: pd.DataFrame) -> Figure:
-    """One row an entry, one panel a budget: the interquartile mean over layouts, with its interval.
+def gains(advised: pd.DataFrame, finding: str) -> Figure:
+    """One row an entry, one mark a budget: the interquartile mean over layouts, with its interval.
 
     Args:
         advised: of `remedies.advice`, the first on top.
+        finding: the title.
     """
     words = dict(zip(advised.entry, advised.word, strict=True))
-    high = 0.2 * len(words) + 0.8
-    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
-    tall = len(ADVISED) * (high + 0.3) + 0.6
-    figure, panels = subplots(1, len(ADVISED), high, tall=tall, **options)
-    for axes, part in zip(panels.flat, ADVISED, strict=True):
-        _panel(axes, words, advised[advised.part == part])
-        axes.set_title(f"{PARTS[part].episodes} episodes", fontsize="medium", fontweight="normal")
-    return headed(figure, _finding(words))
+    figure, axes = subplots(height=0.24 * len(words) + 1.1)
+    axes.axvline(0, **LIMIT)
+    axes.axvline(1, **AT_ONE)
+    for part, shift, face in zip(ADVISED, (-0.18, 0.18), (INK, "white"), strict=True):
+        of_part = advised[advised.part == part]
+        for entry, share in zip(of_part.entry, of_part.gain, strict=True):
+            _mark(axes, [*words].index(entry) + shift, share, face)
+        axes.plot([], [], "o", color=INK, mfc=face, label=f"{PARTS[part].episodes} episodes")
+    names = [f"{entry}: {word}" for entry, word in words.items()]
+    axes.set_yticks(range(len(words)), names, fontsize="small")
+    axes.set(xlim=(LEAST, MOST), ylim=(len(words) - 0.4, -0.6))
+    axes.set(xlabel="share of the possible gain")
+    below(figure, axes.get_legend_handles_labels()[0])
+    return headed(figure, finding)
 
 
 @page
@@ -93,31 +99,9 @@ def _cheapest(budgets: Sequence[int], returned: Mapping[str, Sequence[Judgement]
     return f"With {budgets[-1]} episodes {best} costs least: {share:.0%} of the start's cost"
 
 
-def _panel(axes: Axes, words: Mapping[str, str], rows: pd.DataFrame) -> None:
-    axes.axvline(0, **LIMIT)
-    axes.axvline(1, **AT_ONE)
-    for entry, word, share in zip(rows.entry, rows.word, rows.gain, strict=True):
-        _mark(axes, [*words].index(entry), word, share)
-    names = [f"{entry}: {word}" for entry, word in words.items()]
-    axes.set_yticks(range(len(words)), names, fontsize="small")
-    axes.set(xlim=(LEAST, MOST), ylim=(len(words) - 0.4, -0.6))
-    axes.set(xlabel="share of the possible gain [-]")
-
-
-def _mark(axes: Axes, y: int, word: str, share: Estimate) -> None:
-    """A mark with its interval; an arrow where it lies beyond the panel."""
-    colour = COLOURS.get(word, INK)
+def _mark(axes: Axes, y: float, share: Estimate, face: str) -> None:
+    """A mark with its interval; an arrow where it lies beyond the axes."""
     low, high = np.clip([share.low, share.high], LEAST, MOST)
-    axes.plot([low, high], [y, y], color=colour, linewidth=1.6)
-    if share.value < LEAST:
-        axes.plot(LEAST, y, marker="<", color=colour, markersize=6, clip_on=False)
-    else:
-        axes.plot(share.value, y, marker=MARKS.get(word, "o"), color=colour, markersize=5)
-
-
-def _finding(words: Mapping[str, str]) -> str:
-    """What to try first, second and never, in a title."""
-    by = {word: [entry for entry, one in words.items() if one == word] for word in MARKS}
-    said = [f"{word} {', '.join(entries)}" for word, entries in by.items() if entries]
-    text = "; ".join(said) or "nothing surely gains"
-    return f"What to try: {text}"
+    axes.plot([low, high], [y, y], color=INK, linewidth=1.2)
+    at, marker = (LEAST, "<") if share.value < LEAST else (share.value, "o")
+    axes.plot(at, y, marker, color=INK, markerfacecolor=face, markersize=5, clip_on=False)
