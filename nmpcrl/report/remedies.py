@@ -120,8 +120,9 @@ def _cells(of_entry: pd.DataFrame) -> tuple[str, ...]:
     known = {row.part: _evidence(row) for row in (first, *others)}
     what, told = WHAT[first.entry]
     return (
-        f"{entry_named(first.name)}<br>{what}<br><small>learns from {told}</small>",
-        f'<span class="{BADGES[COLOURS[first.word]]}">{first.word}</span>',
+        entry_named(first.name),
+        f'<span class="{BADGES[COLOURS[first.word]]}">{first.word}</span>'
+        f"<br>{what}<br><small>learns from {told}</small>",
         *(known.get(part, NOTHING) for part in ADVISED),
     )
 

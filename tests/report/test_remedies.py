@@ -58,8 +58,9 @@ def cells(table):
 def test_a_row_has_the_word_the_evidence_and_the_price_in_the_order_of_the_advice(advised):
     head, *found = cells(advice_table(advised, "All."))
     assert len(head) == len(found[0])
-    assert [one[1] for one in found] == [FIRST, SECOND, LATER, OPEN, NEVER]
-    assert found[0][0].startswith("CMA-ES|spread=0.1|a search of all nine numbers by CMA-ES|")
+    assert [one[1].split("|")[0] for one in found] == [FIRST, SECOND, LATER, OPEN, NEVER]
+    assert found[0][0] == "CMA-ES|spread=0.1"
+    assert "a search of all nine numbers by CMA-ES" in found[0][1]
     assert found[0][2] == "0.80 [0.70, 0.90]|90% of 120| layouts; 49 rollouts, 0.5 s"
     assert found[0][3].startswith("0.99 [0.98, 1.00]|")
     assert found[1][3] == remedies.NOTHING
