@@ -49,7 +49,7 @@ def pages() -> list[str]:
     """The pages of _toc.yml in their order, without suffix."""
     toc = from_yaml("_toc.yml")
     chapters = [page for part in toc["parts"] for page in part["chapters"]]
-    each = [one["file"] for page in chapters for one in (page, *page.get("sections", ()))]
+    each = [page["file"] for page in chapters]
     return [toc["root"], *each]
 
 

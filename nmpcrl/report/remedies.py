@@ -76,7 +76,7 @@ def evidence(advised: pd.DataFrame, entry: str) -> dict[str, Any]:
     return {
         "name": f"`{entry}`", "what": what, "rollouts": str(row.rollouts),
         "gain": Cited(row.gain, f"share of the possible gain, {entry}, {row.part}: published"),
-        "solved": Cited(row.solved.value, f"layouts solved, {entry}, {row.part}: published"),
+        "solved": Cited(row.solved, f"layouts solved, {entry}, {row.part}: published"),
     }  # fmt: skip
 
 
