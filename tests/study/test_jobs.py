@@ -171,7 +171,7 @@ def test_no_process_outlives_the_parent(program, job, sent):
         os.killpg(parent.pid, sent)  # as a terminal does
     else:
         parent.kill()
-    assert parent.wait() != 0
+    assert parent.wait(120) != 0
     wait_until(lambda: not program.alive())
 
 

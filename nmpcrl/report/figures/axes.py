@@ -75,9 +75,9 @@ def map_grid(
 
 
 def label_panel(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
-    """Which reading of the decay a panel shows, and whole episodes below."""
+    """Which decay of the noise a panel shows, and whole episodes below."""
     axes.set_title(DECAY_TITLES.get(decay, ""), fontsize="medium", fontweight="normal")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.xaxis.set_major_locator(MaxNLocator(4, integer=True, min_n_ticks=1))
     axes.set_xlabel(xlabel)
 
 
