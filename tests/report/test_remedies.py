@@ -100,7 +100,7 @@ def test_a_table_of_a_part_has_each_layout_and_the_greatest_share_first(runs):
 def test_the_evidence_of_an_entry_is_that_with_the_smaller_budget(advised):
     found = remedies.evidence(advised, "CMA-ES")
     assert f"{found['gain'].value:.2f}" == "0.80 [0.70, 0.90]"
-    assert found["solved"].value == pytest.approx(0.9)
+    assert found["solved"].value.value == pytest.approx(0.9)
     assert remedies.safest(advised) == ["control-RDES"]
 
 
