@@ -48,9 +48,7 @@ def from_yaml(name: str) -> Any:
 def pages() -> list[str]:
     """The pages of _toc.yml in their order, without suffix."""
     toc = from_yaml("_toc.yml")
-    chapters = [page for part in toc["parts"] for page in part["chapters"]]
-    each = [page["file"] for page in chapters]
-    return [toc["root"], *each]
+    return [toc["root"], *(page["file"] for part in toc["parts"] for page in part["chapters"])]
 
 
 def notebooks() -> dict[str, Path]:

@@ -277,7 +277,7 @@ _CLAIMS: tuple[Claim, ...] = (
     AtLeast(
         name="C9",
         statement="Learning with RDES and GES beats theta_init without noise, which the paper"
-        " takes for granted.",
+        " implies.",
         short="RDES and GES\nbeat $\\theta_\\mathrm{init}$",
         question="Does the run of RDES, or of GES, end with a lower noise-free cost than"
         " theta_init's?",

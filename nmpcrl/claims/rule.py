@@ -70,7 +70,7 @@ class Claim(ABC):
     would_change: str  #: where another verdict is expected
     learners: tuple[str, ...] = ()  #: whose runs answer, in the order of the question
     quotation: str = ""  #: the paper's sentences behind it, in Markdown
-    implied: bool = False  #: whether the paper takes it for granted, and nowhere says it
+    implied: bool = False  #: whether the paper implies it, and nowhere says it
     words: Mapping[Outcome, str] = field(default_factory=dict)  #: for outcomes with own words
 
     @abstractmethod

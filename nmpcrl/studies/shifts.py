@@ -22,7 +22,7 @@ from nmpcrl.analysis.suite import entry, judge
 from nmpcrl.claims.investigation import Row
 from nmpcrl.control import Nmpc
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, expected_sarsa, train
-from nmpcrl.learning.network import QNetwork
+from nmpcrl.learning.network import QNetwork, machine_code
 from nmpcrl.learning.training import absurd
 from nmpcrl.studies.worlds_run import THETA, controller, exploration, row
 from nmpcrl.study import Experiment, paper
@@ -82,12 +82,10 @@ class Recent(QNetwork):
     def fit(self) -> float:
         """One Adam step on a mini-batch of `draw`; its loss before the step."""
         weights, examples, _, counts, *rest = self.net
-        drawn = QNetwork.__new__(QNetwork)
-        few = np.array([paper.BATCH, counts[1]])
-        order = np.arange(paper.BATCH, dtype=np.int32)
-        drawn.net = (weights, examples[self.draw()], order, few, *rest)
-        loss = drawn.fit()
-        counts[1] = few[1]
+        order, batch = np.arange(paper.BATCH, dtype=np.int32), np.array([paper.BATCH, counts[1]])
+        drawn = (weights, examples[self.draw()], order, batch, *rest)
+        loss = float(machine_code().fit(drawn))
+        counts[1] = batch[1]
         return loss
 
 

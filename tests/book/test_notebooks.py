@@ -73,7 +73,8 @@ def lines_of_code(source: str) -> int:
 
 def test_the_chapters_are_there_and_in_the_table_of_contents():
     *numbered, last = CHAPTERS
-    assert [name[:2] for name in numbered] == sorted({name[:2] for name in numbered})
+    assert [name[:2] for name in numbered] == [f"{i:02}" for i in range(1, len(numbered) + 1)]
+    assert len(numbered) >= 9
     assert last == "solver"
     assert set(NOTEBOOKS) == set(project.notebooks())
 

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -54,6 +55,7 @@ class Program:
             [sys.executable, *options, "-c", PROGRAM, *arguments],
             env=environment | {"PYTHONPATH": str(Path.cwd()), "FOLDER": str(self.folder)},
             start_new_session=True,
+            preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # `&` ignores it
         )
         return self.process
 

@@ -109,7 +109,7 @@ def _by_hand(theta: Vector, states: Vector, inputs: Vector, target: Vector, gamm
 
 
 def saved(answer: Any) -> Outcome:
-    """The late training cost of a run beside that of its frozen arm at the same time."""
+    """The late training cost of a run beside that of its baseline at the same time."""
     late = 20
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
@@ -129,11 +129,11 @@ def saved(answer: Any) -> Outcome:
         draw,
         tolerance=2e-3,  # the mean of the ratios is as good as the ratio of the means
         mistakes={
-            "A frozen arm with itself still saves something: compare the last episodes of both "
+            "A baseline with itself still saves something: compare the last episodes of both "
             "runs, in which the noise is the same.": (
                 lambda training, frozen: 1 - training[-late:].mean() / training[:late].mean()
             ),
-            "The first episodes of the frozen arm have more noise than the last ones of the run: "
+            "The first episodes of the baseline have more noise than the last ones of the run: "
             "compare both at the same time.": (
                 lambda training, frozen: 1 - training[-late:].mean() / frozen[:late].mean()
             ),

@@ -40,7 +40,7 @@ def diagnosis(answer: Any) -> Outcome:
             "b": "a step there moves its target farther than its value; the states that follow, "
             "where such a step would be taken back, are not updated.",
             "c": "ES has no w, so there is no term to be dropped.",
-            "d": "The frozen arm meets the same noise, and its theta stays where it is.",
+            "d": "The baseline meets the same noise, and its theta stays where it is.",
         },
     )
 

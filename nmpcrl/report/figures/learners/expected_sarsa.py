@@ -99,7 +99,7 @@ def overshoot(runs: Runs[Records]) -> Figure:
 
 @page
 def two_costs(runs: Runs[Records]) -> Figure:
-    """Cost with noise and without, of a learner and of the frozen arm; a column a decay."""
+    """Cost with noise and without, of a learner and of the baseline; a column a decay."""
     decays = runs.values_of("decay")
     figure, grid = subplots(2, len(decays), height=5.2, sharex=True, sharey="row", squeeze=False)
     for column, decay in zip(grid.T, decays, strict=True):
