@@ -56,13 +56,3 @@ def ratios_at_paper_speed(timings: pd.DataFrame) -> tuple[float, float]:
     """C3's ratio at the paper's time of a solve: if all solves took alike, and with warm starts."""
     model, solve = saving(timings), 1e3 * learners.PAPER_SOLVE
     return model.ratio(solve, warm=1.0), model.ratio(solve)
-
-
-def at_paper_speed(timings: pd.DataFrame) -> str:
-    """What C3's ratio would be with solves as slow as the paper's; `timings` of `time_learners`."""
-    alike, warm = ratios_at_paper_speed(timings)
-    return (
-        f"With solves of {learners.PAPER_SOLVE:.2f} s, the paper's, a step of RDES would take"
-        f" {warm:.2f} of the time of a step of ES if warm starts helped as they help the slowest"
-        f" solver here, and {alike:.2f} if all solves took alike (C3)."
-    )
