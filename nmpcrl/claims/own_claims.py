@@ -106,7 +106,7 @@ _CLAIMS: tuple[RunClaim, ...] = (
         question="Does ES with GES's step length end as GES does with the same layout, decay and"
         " seed?",
         border=f"apart by at most {SAME_COST:.0%}",
-        would_change="A larger beta (departure J): w starts near 0, and with w = 0 GES is ES.",
+        would_change="A larger beta (our assumption J): w starts near 0, and with w = 0 GES is ES.",
         threshold=SAME_COST,
         **compared(("matched", "GES"), pd.Series.abs),
     ),

@@ -136,7 +136,7 @@ _CLAIMS: tuple[Claim, ...] = (
         " that of the baseline without learning under the same noise",
         border=f"diverged: stopped, or above {thresholds.DIVERGED}",
         would_change="Other layouts and the untold details of the network; Algorithm 1 read"
-        " literally (departure G).",
+        " literally (our assumption G).",
         learners=("DES", "RDES"),
         number=thresholds.training_cost_ratio,
         threshold=thresholds.DIVERGED,
@@ -276,15 +276,14 @@ _CLAIMS: tuple[Claim, ...] = (
     ),
     AtLeast(
         name="C9",
-        statement="Learning with RDES and GES beats theta_init without noise, which the paper"
-        " implies.",
+        statement="Learning with RDES and GES lowers the cost without noise.",
         short="RDES and GES\nbeat $\\theta_\\mathrm{init}$",
         question="Does the run of RDES, or of GES, end with a lower noise-free cost than"
         " theta_init's?",
         measured="share of theta_init's noise-free cost that the last three rollouts save",
         border=f"at least {thresholds.BETTER:.0%}",
         would_change="The layout, and theta_c: near d_o it removes the penalty altogether"
-        " (departure N).",
+        " (our assumption N).",
         quotation="“an RL algorithm can advantageously adjust the parameters of the NMPC […] to"
         " enhance closed-loop performance” (Section II-B); no figure shows the performance without"
         " learning",
@@ -316,7 +315,7 @@ WIDER_CLAIMS: dict[str, RunClaim] = {
     "W9": replace(
         BY_RUNS["C9"],
         name="W9",
-        statement="Learning with any of the four learners beats theta_init without noise.",
+        statement="Learning with any of the four learners lowers the cost without noise.",
         question="Does the run of one of the four learners end with a lower noise-free cost than"
         " theta_init's?",
         short="all four\nbeat $\\theta_\\mathrm{init}$",

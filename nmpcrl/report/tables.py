@@ -157,11 +157,11 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
 
 
 def departure(letter: str) -> str:
-    """The gap, its reading, the reason and the variant of one departure, in Markdown."""
+    """What the paper has, what is done here, why, and the variant, in Markdown."""
     entry = DEPARTURES[letter]
     parts = {"The paper": entry.gap, "Here": entry.reading, "Why": entry.why}
     if entry.variant:
-        parts["To run another reading"] = _options(entry.variant.split(", "))
+        parts["To run it otherwise"] = _options(entry.variant.split(", "))
     return "\n\n".join(f"**{name}.** {text}" for name, text in parts.items())
 
 
@@ -265,5 +265,5 @@ def _sentence(text: str) -> str:
 
 
 def linked(text: str) -> str:
-    """Markdown in which "departure C" is a link to its entry."""
-    return re.sub(r"\b(departure ([A-Z]))\b", lambda it: departure_link(it[1], it[2]), text)
+    """Markdown in which "our assumption C" is a link to its entry."""
+    return re.sub(r"\b(our assumption ([A-Z]))\b", lambda it: departure_link(it[1], it[2]), text)
