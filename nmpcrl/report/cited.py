@@ -69,11 +69,15 @@ def by_reading(
         origin: whose numbers these are and from where.
     """
     medians = pd.Series([*values], dtype=float).groupby([*decays], sort=False).median()
-    shown = {decay: format(median, form).replace("inf%", "∞") for decay, median in medians.items()}
     return " and ".join(
-        f"{cited(text, medians[decay], f'{name} per {decay}: {origin}')} (per {decay})"
-        for decay, text in shown.items()
+        f"{cited(finite(at, form), at, f'{name} per {decay}: {origin}')} (per {decay})"
+        for decay, at in medians.items()
     )
+
+
+def finite(value: Any, form: str) -> str:
+    """A number in a format; of one that is infinite, as the cost of a run that failed, ∞."""
+    return format(value, form).replace("inf%", "∞").replace("inf", "∞")
 
 
 def is_number(value: Any) -> bool:

@@ -13,7 +13,7 @@ from IPython.display import Markdown, display
 import nmpcrl
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import Outcome
-from nmpcrl.report.cited import cited, is_number
+from nmpcrl.report.cited import cited, finite, is_number
 
 ROOT = Path(nmpcrl.__file__).parents[1]
 
@@ -60,9 +60,7 @@ def filled(template: str, *, origin: str = "", **numbers: Any) -> str:
     def shown(found: re.Match[str]) -> str:
         name, form = found[1], found[2] or ""
         value = numbers[name]
-        words = format(value, form)
-        if is_number(value):  # the cost of a run that failed is infinite
-            words = words.replace("inf%", "∞").replace("inf", "∞")
+        words = finite(value, form) if is_number(value) else format(value, form)
         if not origin or not is_number(value) or _in_formula(found):
             return words
         return cited(words, value, f"{name.replace('_', ' ')}: {origin}")

@@ -124,11 +124,15 @@ def test_an_estimate_carries_its_interval():
     assert shown.startswith('<data value="0.5 [0.25, 0.75]" title="rate: us">0.50 [')
 
 
-def test_a_median_is_said_for_each_reading_of_the_decay_and_never_for_both():
+@pytest.mark.parametrize(
+    ("form", "text"),
+    [(".0%", "75% (per step) and ∞ (per episode)"), (".2f", "0.75 (per step) and ∞ (per episode)")],
+)
+def test_a_median_is_said_for_each_reading_of_the_decay_and_never_for_both(form, text):
     decays = ("step", "step", "episode", "episode")
-    text = by_reading("share", ".0%", (0.7, 0.8, 0.4, np.inf), decays, "4 runs")
-    assert re.sub("<[^>]*>", "", text) == "75% (per step) and ∞ (per episode)"
-    assert re.findall('title="([^"]*)"', text) == [
+    said = by_reading("share", form, (0.7, 0.8, 0.4, np.inf), decays, "4 runs")
+    assert re.sub("<[^>]*>", "", said) == text
+    assert re.findall('title="([^"]*)"', said) == [
         "share per step: 4 runs",
         "share per episode: 4 runs",
     ]
