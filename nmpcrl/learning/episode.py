@@ -78,7 +78,7 @@ def episodes(
     """The steps of `train` to the last bit, by episodes; the arguments are the same.
 
     For a learner that is built in, with riccati and a `Plant`, one compiled function makes them,
-    and `train` a step in which that fails, as where fatrop takes over.
+    and `train` a step in which that fails, as where Ipopt takes over.
     """
     trainer = Trainer(learner, controller, weights, explore, **options)
     return trainer.run(partial(_episode, trainer, Loop.of(trainer)))

@@ -9,6 +9,7 @@ import pytest
 
 from nmpcrl.control import Nmpc, Problem, Riccati, SolverError, Status, rk4
 from nmpcrl.control.solvers.codes import End
+from nmpcrl.study.problems import gros_zanon
 
 PERIOD = 0.1  # s
 
@@ -112,13 +113,13 @@ def test_a_cost_that_is_flat_at_rest_and_steep_elsewhere_is_scaled(size):
 
 
 @pytest.mark.usefixtures("interpreted")
-def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
+def test_ipopt_takes_over_where_riccati_finds_no_optimum(monkeypatch):
     problem = scalar(5)
     nmpc = Nmpc(problem)
     code, best = nmpc._free.solver, nmpc.solve([1.0], problem.theta)
     monkeypatch.setattr(code, "code", lambda *_: (0.0, 1.0, float(End.STALLED), 0.0, 1.0, 7.0))
     found = nmpc.solve([1.0], problem.theta, best)
-    assert (found.status, found.solver) == (Status.TAKEN_OVER, "fatrop")
+    assert (found.status, found.solver) == (Status.TAKEN_OVER, "ipopt")
     assert found.value == pytest.approx(best.value, rel=1e-6)
     policy = nmpc.policy_jacobian(best)
     monkeypatch.setattr(code, "slopes", None)
@@ -130,3 +131,16 @@ def test_what_no_solver_solves_is_an_error_of_the_one_that_was_asked():
     problem = scalar(3, lambda x, u, th: -(u**2) - x**2)
     with pytest.raises(SolverError, match="riccati"):
         Nmpc(problem, solver=replace(Riccati(), starts=1)).solve([1.0], problem.theta)
+
+
+def test_a_model_in_which_every_plan_explodes_is_refused_and_soon():
+    """Where a learner's theta has diverged; from this state fatrop never returned."""
+    state = [0.07241521776375774, 0.17795563128918557]
+    theta = [
+        -0.02346025254120378, -0.6035290003204876, -1.028794766158787e-09, 9.976703483394326,
+        8.976703483650276, 52.69894282553909, -471.47698769420595, -4.878826558153828,
+        -2.123557218177235, 0.17250770288086642, -368.3687223387759, -35.30873858947078,
+        -4826.768963179773, -2449.217164234251, -81.67612537518058, 438.4537688090195,
+    ]  # fmt: skip
+    with pytest.raises(SolverError, match="model makes .* times as much"):
+        Nmpc(gros_zanon.problem()).solve(state, theta)

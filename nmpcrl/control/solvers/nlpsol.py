@@ -28,7 +28,7 @@ from nmpcrl.control.solvers.starts import random_inputs
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
 MAX_ITERATIONS = 300
-MAX_SECONDS = 5.0  # fatrop has no clock, but its 300 iterations take about 30 ms
+MAX_SECONDS = 5.0  # of the processor; fatrop has no clock
 HIGHEST_PRICE = 100.0  # of a slack, as in the paper: above it the slack's unit becomes smaller
 OFF_REST = 1e-3  # where a cold solve of a `Problem` begins, in parts of the bounds
 ELSEWHERE = 2  # starts that are compared with a plan that is no strict minimum
@@ -78,14 +78,17 @@ class Ipopt(Nlpsol):
             "sb": "yes",
             "tol": self.tolerance,
             "max_iter": MAX_ITERATIONS,
-            "max_wall_time": MAX_SECONDS,
+            "max_cpu_time": MAX_SECONDS,
             "bound_relax_factor": 0.0,
         }
 
 
 @dataclass(frozen=True)
 class Fatrop(Nlpsol):
-    """fatrop: an interior point that follows the stages, as fast as CasADi's get here."""
+    """fatrop: an interior point that follows the stages, as fast as CasADi's get here.
+
+    Version 1.1.8 may never return where all plans lead to enormous states; riccati and Ipopt do.
+    """
 
     name: ClassVar[str] = "fatrop"
     others: ClassVar[tuple[type[Nlpsol], ...]] = (Ipopt,)  #: slower and sturdier

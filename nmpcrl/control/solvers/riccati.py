@@ -20,7 +20,7 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.control.solvers.nlpsol import Fatrop, Program, reorder
+from nmpcrl.control.solvers.nlpsol import Fatrop, Ipopt, Program, reorder
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Prepared, Solver
 from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
@@ -112,7 +112,7 @@ DEFAULT = Riccati()
 
 
 class Compiled:
-    """The machine code of a problem, called for one OCP; where no start succeeds, fatrop solves."""
+    """The machine code of a problem, called for one OCP; where no start succeeds, Ipopt solves."""
 
     def __init__(self, ocp: Ocp, solve: Any, solver: Riccati = DEFAULT) -> None:
         problem = self._problem = ocp.problem
@@ -173,7 +173,7 @@ class Compiled:
                 int(failed), violation,
             )  # fmt: skip
         try:
-            found = self._fatrop.solve(state, theta, None, *action, began=began, data=data)
+            found = self._last_resort.solve(state, theta, None, *action, began=began, data=data)
         except SolverError:
             raise SolverError(
                 f"{Riccati.name} found no optimum from {failed:.0f} starts (the last"
@@ -185,8 +185,8 @@ class Compiled:
         return replace(found, took_over=True)
 
     @cached_property
-    def _fatrop(self) -> Program:
-        return Program(self._ocp, Fatrop(self.tolerance))
+    def _last_resort(self) -> Program:  # not fatrop, which may never return
+        return Program(self._ocp, Ipopt(self.tolerance))
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
