@@ -142,5 +142,5 @@ def test_a_model_in_which_every_plan_explodes_is_refused_and_soon():
         -2.123557218177235, 0.17250770288086642, -368.3687223387759, -35.30873858947078,
         -4826.768963179773, -2449.217164234251, -81.67612537518058, 438.4537688090195,
     ]  # fmt: skip
-    with pytest.raises(SolverError, match="model makes .* times as much"):
+    with pytest.raises(SolverError, match=r"model makes .* times as much"):
         Nmpc(gros_zanon.problem()).solve(state, theta)
