@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from copy import deepcopy
+from itertools import combinations, starmap
 from typing import Any
 
 import numpy as np
@@ -39,12 +40,11 @@ def function(
         raise Unsolved(f"A function is asked for, not {answer!r}.")
     rng, known = np.random.default_rng(), dict(mistakes or {})
 
-    def shows(wrong: Callable[..., Any]) -> Callable[[Arguments], bool]:
-        return lambda case: (
-            not agree(wrong(**deepcopy(case)), expected(**deepcopy(case)), tolerance)
-        )
+    def differ(one: Callable[..., Any], other: Callable[..., Any]) -> Callable[[Arguments], bool]:
+        return lambda case: not agree(one(**deepcopy(case)), other(**deepcopy(case)), tolerance)
 
-    cases = telling(lambda: draw(rng), TIMES, map(shows, known.values()))
+    pairs = combinations([expected, *known.values()], 2)  # so that each mistake has its sentence
+    cases = telling(lambda: draw(rng), TIMES, starmap(differ, pairs))
     values = [_called(answer, case) for case in cases]
     refuse_unanswered(values[0])
     different = [

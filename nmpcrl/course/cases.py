@@ -1,4 +1,4 @@
-"""Random cases in which each known mistake shows: a wrong answer is never right by chance."""
+"""Random cases in which each known mistake shows: no answer is right, or another, by chance."""
 
 from collections.abc import Callable, Iterable
 from typing import TypeVar
@@ -11,17 +11,17 @@ MOST = 2000  # that are looked through for one in which a mistake shows
 def telling(
     draw: Callable[[], Case], times: int, shows: Iterable[Callable[[Case], bool]]
 ) -> list[Case]:
-    """Cases, as many as asked for, and one more for each mistake that shows in none of them.
+    """Cases, as many as asked for, and one more for each difference that shows in none of them.
 
     A mistake that shows in one case of six is in none of twenty once in forty times.
 
     Args:
         draw: gives a random case.
         times: how many are drawn in any event.
-        shows: for each known mistake, whether it shows in a case.
+        shows: for each two functions that must be told apart, whether they differ in a case.
 
     Raises:
-        RuntimeError: a mistake does not show in 2000 cases: it is none, or these are drawn badly.
+        RuntimeError: two do not differ in 2000 cases: they are one, or these are drawn badly.
     """
     cases = [draw() for _ in range(times)]
     for seen in shows:

@@ -33,6 +33,13 @@ EXERCISES = list(found())
 BY_NAME = {param.values[0].name: param.values for param in EXERCISES}
 
 
+@pytest.fixture(autouse=True)
+def seeded(monkeypatch) -> None:
+    """Checks draw the same cases each time."""
+    draws = np.random.default_rng
+    monkeypatch.setattr(np.random, "default_rng", lambda seed=0: draws(seed))
+
+
 def given(imports: str) -> dict:
     """What a chapter has computed that an answer or a check needs."""
     names = {"np": np, "comb": comb, "fisher_exact": fisher_exact, "nmpc": paper.nmpc()}
