@@ -1,6 +1,6 @@
 """What the published files come to, frozen: `python tests/golden/freeze.py` writes it anew.
 
-Each function below is one entry of a JSON file beside this one, and computes it from what is
+`FILES` has the entries of each JSON file beside this one, with what computes them from what is
 published; nothing is trained. `test_golden` compares all of them with what the library says.
 """
 
@@ -39,24 +39,12 @@ from nmpcrl.report import worlds as world_report
 from nmpcrl.studies import agents, interventions, other_problems, population, remedies, worlds
 from nmpcrl.studies.predictors import predictor_scores
 from nmpcrl.study import design, paper, provenance
-from nmpcrl.study import published as published_tables
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
 
 FOLDER = Path(__file__).parent
 ROLLOUT = 6  # digits of a rollout's cost, which are the same on all machines
 RAISED = 4  # digits of a difference of two such costs
-FILES: dict[str, dict[str, Callable[[], Any]]] = {}  # by file, its entries by name
-
-
-def entry(file: str) -> Callable[[Callable[[], Any]], Callable[[], Any]]:
-    """Make a function an entry of a file, under its own name."""
-
-    def add(compute: Callable[[], Any]) -> Callable[[], Any]:
-        FILES.setdefault(file, {})[compute.__name__.replace("_", " ")] = compute
-        return compute
-
-    return add
 
 
 def computed(file: str) -> dict[str, Any]:
@@ -86,6 +74,7 @@ again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
 every = cache(lambda: evidence.gather("published", variants=True))
 six_paths = cache(lambda: every().paths)
+raised = cache(population.raised)
 
 
 def by_question(answers: Iterable[Any]) -> dict[str, Any]:
@@ -106,20 +95,6 @@ def by_claim(verdicts: Iterable[Any]) -> dict[str, Any]:
     }
 
 
-# The study in layouts A to F.
-
-
-@entry("verdicts")
-def as_published() -> Any:
-    return by_claim(study().verdicts)
-
-
-@entry("verdicts")
-def thresholds_and_rule() -> Any:
-    return {"numbers": prespecified.NUMBERS, "fixed": prespecified.fixed(study().about)}
-
-
-@entry("verdicts")
 def other_borders() -> Any:
     main, known = every().main.runs, {}
     for name, claim in {**paper_claims.BY_RUNS, **own_claims.OWN_CLAIMS}.items():
@@ -135,43 +110,17 @@ def other_borders() -> Any:
     return known
 
 
-@entry("verdicts")
-def distances_of_policies() -> Any:
-    return table(paper_claims.policy_distances(every().main.runs, six_paths()))
-
-
-@entry("verdicts")
 def constraints_without_noise() -> Any:
     kept = paper_claims.kept_without_noise(every().main.runs, PAPER)
     return kept.groupby(level="learner", sort=False).agg(["sum", "size"])
 
 
-@entry("verdicts")
-def costs_less_than_GES() -> Any:
+def costs_less_than_ges() -> Any:
     others, main = ("ES", "DES", "RDES", "TDC"), study().main.runs
     functions = (own_claims.costs_less, own_claims.costs_less_anew)
     return {name: [one(main, name, "GES") for one in functions] for name in others}
 
 
-@entry("study")
-def robustness_map() -> Any:
-    found = robustness.robustness_map(every().runs, six_paths())
-    return found.set_index(["variant", "claim"])
-
-
-@entry("study")
-def readings_of_DES() -> Any:
-    return robustness.readings_of_des(every().runs, six_paths())
-
-
-@entry("study")
-def failure_modes() -> Any:
-    runs = study().runs
-    cells = ["variant", "learner", "wrong", "mechanism", "ending"]
-    return runs.groupby(cells, sort=False).size()
-
-
-@entry("study")
 def runs_that_went_wrong() -> Any:
     kinds = {"diverged": thresholds.divergence, "unstable": thresholds.instability}
     runs, found = study().main.runs, {}
@@ -185,19 +134,12 @@ def runs_that_went_wrong() -> Any:
     return found
 
 
-@entry("study")
 def answers_of_thresholds() -> Any:
     runs = study().runs
     names = ("was_stopped", "worsens", "improves", "solved", "cost_reduction", "late_cost_range")
     return table(pd.DataFrame({name: getattr(thresholds, name)(runs) for name in names}))
 
 
-@entry("study")
-def the_finding() -> Any:
-    return plain(finding.finding(study()), ROLLOUT)
-
-
-@entry("study")
 def middle_of_each_learner() -> Any:
     runs = study().main.runs
     left = runs.final_cost.where(runs.stopped == "finished", np.inf) / runs.initial_cost
@@ -205,14 +147,12 @@ def middle_of_each_learner() -> Any:
     return {name: interquartile_mean(left[i], list(runs.layout[i])) for name, i in groups}
 
 
-@entry("study")
 def share_of_the_possible() -> Any:
     gains = {search.layout: found.gain for search, found in study().searches.items()}
     shares = thresholds.share_of_possible(study().main.runs, gains)
     return shares.groupby(study().main.runs.learner).median()
 
 
-@entry("study")
 def searches() -> Any:
     names = ("theta", "made", "initial", "cost", "gain")
     return {
@@ -224,7 +164,6 @@ def searches() -> Any:
     }
 
 
-@entry("study")
 def ratios_of_times() -> Any:
     pairs = study().timings[["solver", "learner"]].itertuples(index=False, name=None)
     return {
@@ -232,44 +171,13 @@ def ratios_of_times() -> Any:
     }
 
 
-@entry("study")
-def batches() -> Any:
-    first, *others = study().batches
-    six = [{**first, "runs": study().parts}, *others]  # the first one lists all runs
-    parts = published_tables.about("population")["batches"]
-    totals = {part: n for one in parts for part, n in one["rows"].items()}
-    every_run = [one | {"runs": one["rows"]} for one in parts]
-    every_run[0]["runs"] = {part: totals[part] for part in population.PARTS}
-    known = {"six": six, "drawn": every_run}
-    names = ("date", "epochs", "versions", "hours", "runs")
-    return {
-        name: [{one: batch.get(one) for one in names} for batch in batches]
-        for name, batches in known.items()
-    }
-
-
-# The drawn layouts.
-
-
-@entry("population")
-def shares() -> Any:
-    return drawn().shares.set_index("claim")
-
-
-@entry("population")
-def shares_in_A_to_F() -> Any:
+def shares_in_a_to_f() -> Any:
     main, names = study().main.runs, list(population.EXPECTED)
     runs = study().runs[study().runs.variant == design.MAIN_TABLE]
     assert len(main) == len(runs)
     return population.shares(population.by_layout(runs, study().paths, names)).set_index("claim")
 
 
-@entry("population")
-def where_each_claim_holds() -> Any:
-    return table(population.by_layout(drawn().main, drawn().paths))
-
-
-@entry("population")
 def verdicts_that_stand() -> Any:
     outcomes = {one.claim: one.outcome for one in study().verdicts}
     found = drawn().shares
@@ -277,13 +185,11 @@ def verdicts_that_stand() -> Any:
             if one.claim in outcomes}  # fmt: skip
 
 
-@entry("population")
 def answers() -> Any:
     found = population.POPULATION.judge(drawn())
     return by_question(found[one.name] for one in population.QUESTIONS if one.name != "cliff")
 
 
-@entry("population")
 def other_answers() -> Any:
     return {
         "cliff": plain(by_question([named("cliff", population.cliff(raised()))]), RAISED),
@@ -294,26 +200,16 @@ def other_answers() -> Any:
     }
 
 
-raised = cache(population.raised)
-
-
 def named(question: str, answer: Any) -> Any:
     return replace(answer, question=question)
 
 
-@entry("population")
-def the_raised_costs() -> Any:
-    return plain(raised(), RAISED)
-
-
-@entry("population")
 def predictors() -> Any:
     parts, layouts = drawn().runs.groupby("part"), drawn().layouts
     tuned, judged = population.succeeds(parts.get_group("tune")), population.succeeds(drawn().main)
     return predictor_scores(layouts, tuned, judged)
 
 
-@entry("population")
 def successes() -> Any:
     parts = {"main": drawn().main, **dict(iter(drawn().runs.groupby("part", sort=False)))}
     learners = ("ES", "GES")
@@ -324,13 +220,11 @@ def successes() -> Any:
     }
 
 
-@entry("population")
 def at_the_gap() -> Any:
     ends = drawn_report.at_the_gap(drawn())
     return {"runs": table(ends), "improve": drawn_report.improve_by_gap(ends)}
 
 
-@entry("population")
 def whole_picture_tried() -> Any:
     tried = drawn().tried
     columns = ["setting", "layout", "decay", *population.PICTURE, "whole", "answers"]
@@ -341,7 +235,6 @@ def whole_picture_tried() -> Any:
     }
 
 
-@entry("population")
 def runs_made_again() -> Any:
     asked = [("true slope", "none"), ("theta held", "none"), ("nudged", "none")]
     asked += [("true slope", "nudged"), ("theta held", "nudged")]
@@ -352,28 +245,11 @@ def runs_made_again() -> Any:
     }
 
 
-@entry("population")
-def which_runs_are_made_again() -> Any:
-    one = interventions.INTERVENTIONS
-    chosen = [(part, at) for part, each in one.parts.items() for at in each.order("nudged")]
-    names = [f"{part} {at[0]} {one.seed(*at)}" for part, at in chosen]
-    return {"first": names[:5], "count": len(names), "all": short(names)}
-
-
-# The comparison of remedies.
-
-
 def by_field(row: Any) -> dict[str, Any]:
     """The fields of a `RemedyRow` by name."""
     return {name: getattr(row, name) for name in remedies.RemedyRow._fields}
 
 
-@entry("remedies")
-def answers_on_remedies() -> Any:
-    return by_question(remedies.REMEDIES.answers(suite()).values())
-
-
-@entry("remedies")
 def advice() -> Any:
     by_entry = remedies.advice(suite()).groupby("entry", sort=False)
     return {
@@ -387,61 +263,17 @@ def advice() -> Any:
     }
 
 
-@entry("remedies")
 def what_was_expected() -> Any:
     advised = remedies.advice(suite())
     return remedies.expectations(advised) | {"greatest": remedies.greatest(advised)}
 
 
-@entry("remedies")
-def rows() -> Any:
-    return {
-        part: {one.entry: by_field(one) for one in remedies.rows(suite()[suite().part == part])}
-        for part in [*remedies.PARTS][1:]
-    }
-
-
-@entry("remedies")
 def shares_in_named_layouts() -> Any:
     there = suite()[suite().part.str.startswith("named")]
     groups = there.groupby(["part", "entry"], sort=False)
     return {plain_name(name): remedies.shares(runs) for name, runs in groups}
 
 
-@entry("remedies")
-def best_settings() -> Any:
-    tuned = suite()[suite().part == "tune"].groupby("entry", sort=False)
-    return {entry: remedies.best_setting(runs) for entry, runs in tuned}
-
-
-# SAC and TD3.
-
-
-@entry("agents")
-def answers_on_agents() -> Any:
-    return by_question(agents.SAC_AND_TD3.judge((trained(), suite())).values())
-
-
-@entry("agents")
-def answers_without_the_suite() -> Any:
-    return {
-        name: one.outcome
-        for name, one in agents.SAC_AND_TD3.judge((trained(), suite()[:0])).items()
-    }
-
-
-@entry("agents")
-def rows_of_the_suite() -> Any:
-    return {one.entry: by_field(one) for one in agents.rows(trained(), suite())}
-
-
-@entry("agents")
-def costs_of_the_best_search() -> Any:
-    found = (agents.searched(suite(), part) for part in agents.SEARCHED)
-    return dict(zip(agents.SEARCHED, found, strict=True))
-
-
-@entry("agents")
 def courses() -> Any:
     found = {}
     asked = [("judge", ()), ("one", ()), ("all", ()), ("all", [*TUNE]), ("all", [*JUDGE])]
@@ -459,69 +291,26 @@ def courses() -> Any:
     return found
 
 
-# Worlds that change.
-
-
-@entry("worlds")
-def answers_on_worlds() -> Any:
-    return by_question(worlds.WORLDS.answers(changing()).values())
-
-
-@entry("worlds")
-def medians() -> Any:
+def of_worlds(of: Callable[[pd.DataFrame], Any]) -> dict[str, Any]:
+    """What comes of the means of each column in each part of the worlds that change."""
     columns = ("cost", "inside", "arrived")
     return {
-        f"{part}, {column}": worlds.means(changing(), part, column).median()
+        f"{part}, {column}": of(worlds.means(changing(), part, column))
         for part, column in product(worlds.PARTS, columns)
     }
 
 
-@entry("worlds")
-def means() -> Any:
-    columns = ("cost", "inside", "arrived")
-    return {
-        f"{part}, {column}": table(worlds.means(changing(), part, column))
-        for part, column in product(worlds.PARTS, columns)
-    }
-
-
-@entry("worlds")
-def shares_after_a_change() -> Any:
-    return {part: worlds.shares(changing(), part).median() for part in worlds.CHANGES}
-
-
-@entry("worlds")
-def carried() -> Any:
-    return {arm: table(worlds.carried(changing(), arm)) for arm in ("ES", "CMA-ES")}
-
-
-@entry("worlds")
-def solved_with_a_terminal_cost() -> Any:
-    return worlds.solved_with(changing()).sum()
-
-
-@entry("worlds")
 def saved_with_a_wrong_model() -> Any:
     found = world_report.saved(changing()).groupby(level=0, sort=False)
     return {fault: each.median().dropna().to_dict() for fault, each in found}
 
 
-@entry("worlds")
 def rows_among_moving_obstacles() -> Any:
     found = world_report.moving(changing()).rename(columns={"saved": "gain"})
     return {plain_name(name): row[["clear", "gain", "solved"]].to_dict()
             for name, row in found.iterrows()}  # fmt: skip
 
 
-@entry("worlds")
-def drawn_scenarios() -> Any:
-    return {"count": len(SCENARIOS), "all": short(plain(SCENARIOS))}
-
-
-# Other problems and times.
-
-
-@entry("problems")
 def costs() -> Any:
     return {
         arm: {
@@ -534,19 +323,16 @@ def costs() -> Any:
     }
 
 
-@entry("problems")
 def predictions() -> Any:
     answers = other_problems.OTHER_PROBLEMS.answers(other_problems.OTHER_PROBLEMS.table())
     return {name: one.outcome == REPRODUCED for name, one in answers.items()}
 
 
-@entry("problems")
 def references() -> Any:
     rows = other_problems.OTHER_PROBLEMS.table().query("part == 'references'").set_index("arm")
     return {**problems().references, "theta": rows.theta["best_theta"]}
 
 
-@entry("problems")
 def spread_of_solvers() -> Any:
     runs = problems().spreads
     frame = runs[["before", "nudged", "after"]].copy()
@@ -555,69 +341,6 @@ def spread_of_solvers() -> Any:
         frame[f"{solver}, steps"] = runs[f"steps of {solver}"]
     gaps = np.array([*runs.gap])
     return {"median": frame.median(), "mean": frame.mean(), "gap": np.median(gaps, axis=0)}
-
-
-@entry("problems")
-def sweep_of_drawn_problems() -> Any:
-    return json.loads((published.folder() / "sweep.json").read_text())["tally"]
-
-
-# What is published, as it is loaded.
-
-
-def _columns(rows: pd.DataFrame, names: str) -> pd.DataFrame:
-    """Columns as they were frozen: seeds by that name, series as tuples."""
-    found = rows.rename(columns={"k": "seed"})[names.split()].copy()
-    for name in {"costs", "theta", "gap"} & {*found}:
-        found[name] = found[name].map(tuple)
-    return found
-
-
-@entry("tables")
-def tables() -> Any:
-    kept = json.loads((published.folder() / "problem_times.json").read_text())
-    times = {name: pd.DataFrame(kept[name]) for name in ("sizes", "peers")}
-    known = {
-        "runs": study().runs.drop(columns="source"),
-        "runs of the main table": study().main.runs.drop(columns=["source", "cost_ratio"]),
-        "timings": study().timings,
-        "runs of chapters": every().runs,
-        "drawn runs": drawn().runs,
-        "drawn layouts": drawn().layouts.reset_index(),
-        "where rollouts stop arriving": drawn().stops.reset_index(),
-        "runs made again": again(),
-        "remedies": suite().rename(columns={"arm": "name", "place": "layout"}),
-        "agents": trained(),
-        "worlds": changing(),
-        "other problems": _columns(problems().courses, "arm seed costs test theta"),
-        "spread of solvers": _columns(
-            problems().spreads, "seed peers made before nudged after gap"
-        ),
-        "times by size": times["sizes"],
-        "times beside mpcrl": times["peers"],
-        "searches": pd.DataFrame([vars(one) | vars(two) for one, two in study().searches.items()]),
-    }  # fmt: skip
-    return {name: table(frame) for name, frame in known.items()}
-
-
-@entry("tables")
-def arrays() -> Any:
-    runs = [study().summaries[e] for e in study().rows]
-    return {
-        "training costs": short([array(one.episodes["cost"]) for one in runs]),
-        "theta by episode": short(
-            [array(one.episodes["theta"]) for one in runs if "theta" in one.episodes]
-        ),
-        "runs with theta by episode": sum("theta" in one.episodes for one in runs),
-        **{
-            f"{name} of rollouts without noise": short(
-                [array(one.evaluations[name]) for one in runs]
-            )
-            for name in ("episode", "theta", "cost")
-        },
-        "states": short([array(one.states) for one in runs]),
-        "paths of drawn runs": short([array(one) for one in drawn().paths.values()]),
-    }
 
 
 # What names a run: no edit may change a key, or stored runs would be trained again.
@@ -634,7 +357,6 @@ def keys_of_runs() -> dict[Any, tuple[str, str]]:
         return {e: (provenance.key(e), provenance.summary_key(e)) for e in design.whole_study()}
 
 
-@entry("keys")
 def keys() -> Any:
     parts, wanted = design.whole_study(), dict.fromkeys(reproduce.sample(study().variants, 60))
     first = {part: e for e, part in reversed(parts.items())}
@@ -651,7 +373,6 @@ def keys() -> Any:
     }
 
 
-@entry("keys")
 def all_keys() -> Any:
     known, rows = keys_of_runs(), study().rows
     return {
@@ -661,29 +382,6 @@ def all_keys() -> Any:
     }
 
 
-def plan_of_drawn() -> dict[Any, str]:
-    """The runs in drawn layouts with their parts: learner by learner, layout by layout."""
-    plan = {}
-    for part in population.PARTS:
-        rows = pd.DataFrame([*population.POPULATION.conditions(part)])
-        rows["learner"] = [arm.split()[0] for arm in rows.arm]
-        for _, some in rows.groupby("learner", sort=False):
-            order = some.assign(at=some.place.factorize()[0]).sort_values("at", kind="stable")
-            plan |= dict.fromkeys(population.experiments(order), part)
-    return plan
-
-
-@entry("keys")
-def plans() -> Any:
-    known = {"six": design.whole_study(), "drawn": plan_of_drawn()}
-    lists = {
-        name: [[plain(provenance.identity(e)), part] for e, part in plan.items()]
-        for name, plan in known.items()
-    }
-    return {name: [len(plan), short(plan)] for name, plan in lists.items()}
-
-
-@entry("keys")
 def seeds() -> Any:
     named = (*LAYOUTS, *paper.LAYOUTS)
     where = {part: [*one.places] for part, one in worlds.PARTS.items()}
@@ -695,18 +393,106 @@ def seeds() -> Any:
     }  # fmt: skip
 
 
-@entry("keys")
-def numbers_of_runs() -> Any:
-    return {
-        "remedies": suite().groupby(["part", "entry"], sort=False).size(),
-        "agents": trained().groupby(["part", "arm"], sort=False).size(),
-        "worlds": changing().groupby(["part", "arm"], sort=False).size(),
-    }
-
-
-@entry("machine")
-def abilities() -> Any:
-    return processor()
+FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by name
+    "verdicts": {
+        "as published": lambda: by_claim(study().verdicts),
+        "thresholds and rule": lambda: {
+            "numbers": prespecified.NUMBERS, "fixed": prespecified.fixed(study().about),
+        },
+        "other borders": other_borders,
+        "distances of policies": lambda: table(
+            paper_claims.policy_distances(every().main.runs, six_paths())
+        ),
+        "constraints without noise": constraints_without_noise,
+        "costs less than GES": costs_less_than_ges,
+    },
+    "study": {
+        "robustness map": lambda: robustness.robustness_map(every().runs, six_paths()).set_index(
+            ["variant", "claim"]
+        ),
+        "readings of DES": lambda: robustness.readings_of_des(every().runs, six_paths()),
+        "failure modes": lambda: study().runs.groupby(
+            ["variant", "learner", "wrong", "mechanism", "ending"], sort=False
+        ).size(),
+        "runs that went wrong": runs_that_went_wrong,
+        "answers of thresholds": answers_of_thresholds,
+        "the finding": lambda: plain(finding.finding(study()), ROLLOUT),
+        "middle of each learner": middle_of_each_learner,
+        "share of the possible": share_of_the_possible,
+        "searches": searches,
+        "ratios of times": ratios_of_times,
+    },
+    "population": {
+        "shares": lambda: drawn().shares.set_index("claim"),
+        "shares in A to F": shares_in_a_to_f,
+        "where each claim holds": lambda: table(population.by_layout(drawn().main, drawn().paths)),
+        "verdicts that stand": verdicts_that_stand,
+        "answers": answers,
+        "other answers": other_answers,
+        "the raised costs": lambda: plain(raised(), RAISED),
+        "predictors": predictors,
+        "successes": successes,
+        "at the gap": at_the_gap,
+        "whole picture tried": whole_picture_tried,
+        "runs made again": runs_made_again,
+    },
+    "remedies": {
+        "answers on remedies": lambda: by_question(remedies.REMEDIES.answers(suite()).values()),
+        "advice": advice,
+        "what was expected": what_was_expected,
+        "rows": lambda: {
+            part: {one.entry: by_field(one) for one in remedies.rows(suite()[suite().part == part])}
+            for part in [*remedies.PARTS][1:]
+        },
+        "shares in named layouts": shares_in_named_layouts,
+        "best settings": lambda: {
+            entry: remedies.best_setting(runs)
+            for entry, runs in suite()[suite().part == "tune"].groupby("entry", sort=False)
+        },
+    },
+    "agents": {
+        "answers on agents": lambda: by_question(
+            agents.SAC_AND_TD3.judge((trained(), suite())).values()
+        ),
+        "answers without the suite": lambda: {
+            name: one.outcome
+            for name, one in agents.SAC_AND_TD3.judge((trained(), suite()[:0])).items()
+        },
+        "rows of the suite": lambda: {
+            one.entry: by_field(one) for one in agents.rows(trained(), suite())
+        },
+        "costs of the best search": lambda: {
+            part: agents.searched(suite(), part) for part in agents.SEARCHED
+        },
+        "courses": courses,
+    },
+    "worlds": {
+        "answers on worlds": lambda: by_question(worlds.WORLDS.answers(changing()).values()),
+        "medians": lambda: of_worlds(lambda means: means.median()),
+        "means": lambda: of_worlds(table),
+        "shares after a change": lambda: {
+            part: worlds.shares(changing(), part).median() for part in worlds.CHANGES
+        },
+        "carried": lambda: {
+            arm: table(worlds.carried(changing(), arm)) for arm in ("ES", "CMA-ES")
+        },
+        "solved with a terminal cost": lambda: worlds.solved_with(changing()).sum(),
+        "saved with a wrong model": saved_with_a_wrong_model,
+        "rows among moving obstacles": rows_among_moving_obstacles,
+        "drawn scenarios": lambda: {"count": len(SCENARIOS), "all": short(plain(SCENARIOS))},
+    },
+    "problems": {
+        "costs": costs,
+        "predictions": predictions,
+        "references": references,
+        "spread of solvers": spread_of_solvers,
+        "sweep of drawn problems": lambda: json.loads(
+            (published.folder() / "sweep.json").read_text()
+        )["tally"],
+    },
+    "keys": {"keys": keys, "all keys": all_keys, "seeds": seeds},
+    "machine": {"abilities": processor},
+}  # fmt: skip
 
 
 if __name__ == "__main__":
