@@ -1,12 +1,10 @@
 """The library's pages: what is public has an entry, and the examples run."""
 
-import ast
 import doctest
 import re
 from importlib import import_module
 from pathlib import Path
 
-import nbformat
 import pytest
 from bs4 import BeautifulSoup
 
@@ -30,37 +28,6 @@ def entries(text: str) -> set[str]:
 def test_every_name_that_a_package_exports_has_an_entry_on_its_page(room):
     functions = {name for name in import_module(f"nmpcrl.{room}").__all__ if name != "paper"}
     assert {f"nmpcrl.{room}.{name}" for name in functions} <= entries(PAGES[f"api_{room}"])
-
-
-def imports(notebook: Path) -> set[str]:
-    """What a notebook imports: modules, and names with the module that they come from."""
-    cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
-    nodes = [node for cell in cells for node in ast.walk(ast.parse(cell.source))]
-    found = {one.name for node in nodes if isinstance(node, ast.Import) for one in node.names}
-    chosen = [node for node in nodes if isinstance(node, ast.ImportFrom)]
-    return found | {f"{node.module}.{one.name}" for node in chosen for one in node.names}
-
-
-def test_the_chapter_on_ones_own_problem_uses_what_the_pages_describe():
-    known = set.union(*map(entries, PAGES.values()))
-    homes = {name.rpartition(".")[0] for name in known}
-    ours = {name for name in imports(ROOT / "book/09_your_own.ipynb") if name.startswith("nmpcrl")}
-    inner = tuple(
-        f"nmpcrl.{one}"
-        for one in ("report", "studies", "study.problems", "study.published", "course")
-    )
-    assert {name for name in ours - known - homes if not name.startswith(inner)} == set()
-
-
-def test_functions_of_the_notation_are_there():
-    notation = (ROOT / "book/notation.md").read_text().partition("## Equations\n")[2]
-    named = set(re.findall(r"`([a-z_]+\.[\w.]+)`", notation))
-    assert len(named) > 40
-    for name in named:
-        home, first, *_ = name.split(".")
-        paths = [path.relative_to(ROOT) for path in (ROOT / "nmpcrl").glob(f"*/{home}.py")]
-        modules = [import_module(".".join(path.with_suffix("").parts)) for path in paths]
-        assert any(hasattr(one, first) for one in modules), name
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -21,9 +21,6 @@ from filelock import FileLock
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
-from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.learning import browser
-from nmpcrl.study import paper
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -45,70 +42,36 @@ def refused(result) -> str:
     return sentence
 
 
-def test_a_misspelt_parameter_is_refused_with_the_right_name(driver):
-    sentence = refused(driver("--chapter", "03_rdes", "-p", "episode", "20"))
-    assert "'episode'" in sentence
-    assert "did you mean 'episodes'?" in sentence
-    assert "seeds" in sentence
-
-
-def test_a_chapter_that_does_not_exist_is_refused_with_those_that_do(driver):
-    sentence = refused(driver("--chapter", "03_rde"))
-    assert "'03_rde'" in sentence
-    for chapter in ("01_mdp_and_nmpc", "02_expected_sarsa", "03_rdes", "04_ges", "05_results"):
-        assert chapter in sentence
-    *_, before_last, last = project.notebooks()
-    assert sentence.endswith(f", {before_last} and {last}.")
-
-
 @pytest.mark.parametrize(
-    ("option", "name", "value"),
+    ("arguments", "said"),
     [
-        ("-p", "seeds", "[3]"),
-        ("-p", "episodes", "many"),
-        ("-p", "episodes", "0"),
-        ("-p", "episodes", "2.5"),
-        ("-r", "episodes", "20"),
-        ("-p", "layout", "nowhere"),
-        ("-p", "episodes", "100000000"),
-        ("-p", "seeds", "3"),
-        ("-p", "episodes", "90000"),
-        ("-p", "alpha", "nan"),
+        ("--chapter 03_rdes -p episode 20", "'episode' (did you mean 'episodes'?)"),
+        ("--chapter 03_rde", "'03_rde'"),
+        ("--chapter 03_rde", f", {[*project.notebooks()][-2]} and {[*project.notebooks()][-1]}."),
+        ("--chapter 03_rdes -p episodes many", "episodes = 'many'"),
+        ("--chapter 03_rdes -r episodes 20", "episodes = '20'"),
+        ("--chapter 03_rdes -p episodes 90000", "episodes = 90000"),
+        ("--chapter 03_rdes -p seeds [3]", "{seeds: [3]}"),
+        ("--chapter 03_rdes -y [3]", "'[3]'"),
+        ("-p episodes 20", "--chapter"),
     ],
 )
-def test_a_value_of_the_wrong_type_or_range_is_refused_by_name(driver, option, name, value):
-    sentence = refused(driver("--chapter", "03_rdes", option, name, value))
-    assert name in sentence
-    assert value in sentence
+def test_what_cannot_be_built_is_refused_in_one_sentence(driver, arguments, said):
+    assert said in refused(driver(*arguments.split()))
 
 
-def test_a_list_of_seeds_given_as_text_is_answered_with_the_right_form(driver):
-    assert "{seeds: [3]}" in refused(driver("--chapter", "03_rdes", "-p", "seeds", "[3]"))
-
-
-def test_parameters_without_a_chapter_are_refused(driver):
-    assert "--chapter" in refused(driver("-p", "episodes", "20"))
-
-
-@pytest.mark.parametrize("chapter", ["02_expected_sarsa", "05_results"])
-@pytest.mark.parametrize("kind", ["missing", "empty", "file", "damaged"])
-def test_without_what_is_published_nothing_is_built(driver, tmp_path, monkeypatch, chapter, kind):
-    """Neither a chapter that reads it, nor one whose runs would have nothing to contradict."""
+@pytest.mark.parametrize("kind", ["missing", "file", "damaged"])
+def test_without_what_is_published_nothing_is_built(driver, tmp_path, monkeypatch, kind):
     place = tmp_path / "published"
     monkeypatch.setenv("NMPCRL_PUBLISHED", str(place))
     if kind == "file":
         place.write_text("")
-    elif kind != "missing":
-        place.mkdir()
     if kind == "damaged":
+        place.mkdir()
         (place / "manifest.json").write_text("[" * 100_000)
-    sentence = refused(driver("--chapter", chapter))
+    sentence = refused(driver("--chapter", "02_expected_sarsa"))
     assert str(place) in sentence
     assert "`git checkout -- book/published` restores" in sentence
-
-
-def test_yaml_that_is_no_mapping_is_refused(driver):
-    assert "'[3]'" in refused(driver("--chapter", "03_rdes", "-y", "[3]"))
 
 
 def test_values_are_read_as_papermill_reads_them():
@@ -231,8 +194,9 @@ def test_a_build_that_failed_goes_on_with_what_no_change_of_a_source_has_made_st
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
-def test_no_port_that_another_program_may_take_leads_to_a_kernel(whole):
+def test_a_kernel_has_one_thread_and_no_port_that_another_program_may_take(whole):
     assert '"transport": "ipc"' in "".join(outputs(whole))
+    assert "1 1\n" in outputs(whole)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
@@ -296,31 +260,6 @@ def test_cells_and_solutions_that_fail_are_named_and_no_older_book_survives(smal
     assert not (small / "_build/html").exists()
 
 
-def test_the_learners_are_timed_before_the_chapters_run_and_in_the_way():
-    needs = chapters.ask(ROOT / "book/solver.ipynb", {"length": "smoke"})
-    assert not needs.experiments
-    assert not needs.summaries
-    (call,) = needs.beforehand
-    assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
-    assert call.keywords == {"calm": True}
-
-
-@pytest.mark.parametrize("known", [True, False])
-def test_what_live_figures_solve_with_is_compiled_ahead_if_it_can_be(known, monkeypatch):
-    asked = []
-
-    def module(*of):
-        asked.append(of)
-        if not known:
-            raise CannotCompile("tan")
-
-    monkeypatch.setattr(browser, "module", module)
-    train.compile_for_pages()
-    (plant, task), *problems = asked
-    assert (plant.n, tuple(task.start)) == (3, paper.START)
-    assert [one.data.shape for (one,) in problems] == [(paper.HORIZON + 1, 8)] * known
-
-
 CONTRADICTION = (
     Verdict("C3", "", REPRODUCED, "", "", ratio=0.55, interval=(0.5, 0.6)),
     Verdict("C3", "", NOT, "", ""),
@@ -337,14 +276,6 @@ def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
         project.Failure, match=r"ones:\nC3 is reproduced \[0.50, 0.60\] here, and not"
     ):
         train.measure((lambda: SimpleNamespace(timings=CONTRADICTION),))
-
-
-def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_runs(monkeypatch):
-    from nmpcrl.claims import reproduce
-
-    monkeypatch.setattr(reproduce, "of_runs", lambda fresh, known: (CONTRADICTION,))
-    with pytest.raises(project.Failure, match="C3 is reproduced"):
-        train.train((), ())
 
 
 def exercise(code: str) -> list:
@@ -387,34 +318,3 @@ def test_a_parameter_is_what_papermill_takes_it_for(value):
     taken = chapters.typed(str(value))
     assert type(taken) is type(value)
     assert taken == value or math.isnan(value)
-
-
-IMPORTS = """
-import os
-from importlib import import_module
-from pkgutil import walk_packages
-
-before = dict(os.environ)
-import driver
-
-for found in walk_packages(driver.__path__, "driver."):
-    import_module(found.name)
-assert {**os.environ} == before, {**os.environ}.items() - before.items()
-"""
-
-
-@pytest.mark.slow
-def test_no_module_of_the_driver_changes_the_environment_of_who_imports_it():
-    done = subprocess.run(
-        [sys.executable, "-c", IMPORTS],
-        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'book'}"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-
-
-@pytest.mark.slow
-def test_a_chapter_runs_on_one_thread_and_strictly(whole):
-    assert "1 1\n" in outputs(whole)

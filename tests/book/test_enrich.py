@@ -1,12 +1,9 @@
 """What the driver makes of plain sources, and that it leaves alone what it does not know."""
 
 import pytest
-from driver.build.execute import without_notices
 from driver.build.render import download
 from driver.page import enrich, prose
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-
-from nmpcrl.control.solvers.riccati import NOTICE, PLAN_NOTICE
 
 
 def dressed(*cells) -> list:
@@ -29,18 +26,6 @@ def displayed(**data: str):
 def test_an_anchor_before_an_equation_or_a_heading_is_a_paragraph_of_its_own(block):
     assert enrich.text(f'so\n\n<a id="a"></a>\n{block}') == f'so\n\n<a id="a"></a>\n\n{block}'
     assert enrich.text('- item\n\n  <a id="a"></a>\n  $$') == '- item\n\n  <a id="a"></a>\n\n  $$'
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        "[Eq. (1.6)](01_mdp.ipynb#eq-ocp)",
-        "<details><summary>why</summary>\n\nbody\n\n</details>",
-        "so\n\n$$\nx = 1\n$$\n\nand $y$",
-    ],
-)
-def test_all_else_passes_as_it_is(source):
-    assert enrich.text(source) == source
 
 
 def test_tagged_cells_become_the_boxes_of_the_page():
@@ -109,35 +94,6 @@ def test_a_downloaded_notebook_hides_the_calls_and_keeps_what_they_displayed():
     assert second.metadata == {}
 
 
-def test_a_page_that_was_executed_offers_its_file_below_the_title():
-    book = new_notebook(cells=[new_markdown_cell("# One"), new_markdown_cell("Two")])
-    title, link, _ = enrich.notebook(book, "one.ipynb").cells
-    assert title.source == "# One"
-    assert 'href="one.ipynb" download' in link.source
-
-
-def streams(*texts: str) -> list:
-    return [new_output("stream", name="stderr", text=text) for text in texts]
-
-
-@pytest.mark.parametrize(
-    ("said", "left"),
-    [
-        ((f"{NOTICE} ", "done in 41 s.\n"), []),
-        ((f"{NOTICE} done in 0 s.\n", f"{PLAN_NOTICE} done in 7 s.\n"), []),
-        (("A warning.\n", f"{NOTICE} ", "done in 41 s.\n"), ["A warning.\n"]),
-        (("A warning.\n",), ["A warning.\n"]),
-        ((f"{NOTICE} stopped.\n",), [f"{NOTICE} stopped.\n"]),
-    ],
-)
-def test_what_a_first_solve_says_stands_on_no_page_and_all_else_does(said, left):
-    shown = displayed(text_plain="1.0")
-    executed = new_notebook(cells=[new_code_cell("solve()", outputs=[*streams(*said), shown])])
-    outputs = without_notices(executed).cells[0].outputs
-    assert [one.text for one in outputs if one.output_type == "stream"] == left
-    assert outputs[-1] == shown
-
-
 def test_a_page_begins_with_what_was_found_and_has_one_set_up():
     shown = displayed(text_markdown="1. It moves.")
     box, figure, goals, set_up, shows, exercises = dressed(
@@ -162,11 +118,3 @@ def test_a_page_begins_with_what_was_found_and_has_one_set_up():
     assert "**Learning goals.**" in goals.source
     assert set_up.source == "layout = 'A'\n\nimport numpy"
     assert "hide-input" in set_up.metadata["tags"]
-
-
-def test_what_was_not_executed_stays_where_it_is():
-    cells = dressed(
-        new_code_cell("layout = 'A'", metadata={"tags": ["parameters"]}),
-        new_code_cell('say("1. It moves.")', metadata={"tags": ["opening"]}),
-    )
-    assert [cell.source for cell in cells] == ["layout = 'A'\n\nsay(\"1. It moves.\")"]

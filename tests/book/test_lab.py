@@ -15,15 +15,10 @@ import nbformat
 import pytest
 from driver import project
 from driver.build import book, chapters, execute, train
-from driver.page import prose
 from live_page import CHAPTERS, FRAMES
-
-from nmpcrl.learning import td_error
-from nmpcrl.study import paper
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = list(project.notebooks())
-LAYOUT = "D"  # of chapter 2, where its numbers are not those of the default
 SETTINGS = {  # all cells at once, and no request to another host; the rest is as it comes
     "notebook-extension/tracker": {"windowingMode": "none"},
     "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
@@ -49,17 +44,6 @@ UNREAD = {  # by selector
     "a macro": "mjx-container mtext[mathcolor=red]",
 }
 
-PAGE_ONLY = {  # a source, and what should be found in it
-    "see {ref}`ch:mdp`": "a role",
-    "costs {glue:text}`es-cost:.2f`": "a role",
-    ":::{admonition} Try\n:::": "a directive",
-    "```{math}\nx\n```": "a directive",
-    "(ch:mdp)=\n# Title": "a label",
-    "$$x$$ (eq:a)": "a label",
-    "where $\\vtheta$ is": "a macro",
-    "where $\\frac{a}$ is": "a formula",
-}
-
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_state = pytest.mark.parametrize("state", ["source", "executed"])
 
@@ -82,9 +66,6 @@ def folder(tmp_path_factory, request) -> Iterator[Path]:
             continue
         names = chapters.parameters(ROOT / path)
         jobs[path] = {name: book.SMOKE[name] for name in names if name in book.SMOKE}
-    of_a_layout = chapters.known("02_expected_sarsa")
-    if of_a_layout in jobs:
-        jobs[of_a_layout]["layout"] = LAYOUT
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         patch.setenv("NMPCRL_RUNS", str(place / "runs"))
@@ -188,43 +169,6 @@ def raw(part: Any) -> list[tuple[str, str]]:
 @each_state
 def test_nothing_is_left_raw_in_a_plain_jupyterlab(opened, state, name):
     assert raw(opened(state, name)) == []
-
-
-def test_what_only_the_page_can_show_would_be_found(opened, folder):
-    cells = [nbformat.v4.new_markdown_cell(source) for source in PAGE_ONLY]
-    nbformat.write(nbformat.v4.new_notebook(cells=cells), folder / "source/raw.ipynb")
-    shown = opened("source", "raw").locator(".jp-Cell").all()
-    for cell, (source, what) in zip(shown, PAGE_ONLY.items(), strict=True):
-        assert what in dict(raw(cell)), source
-
-
-def test_chapter_2_shows_the_td_error_of_its_parameters(opened):
-    nmpc = paper.nmpc(LAYOUT)
-    start, theta = nmpc.task.start, paper.THETA_INIT
-    first = nmpc.solve(start, theta)
-    following = nmpc.solve(nmpc.plant.step(start, first.action), theta, first)
-    cost = nmpc.task.stage_cost(start, first.action)
-    delta = td_error(cost, nmpc.gamma, first.value, following.value)
-    item = opened("executed", "02_expected_sarsa").locator("li", has_text="its target")
-    assert delta > 0
-    assert item.inner_text().endswith(f"{delta:.2f}. The value is below its target.")
-
-
-@each_state
-def test_an_editor_shows_a_paragraph_without_the_call_that_says_it(opened, folder, state):
-    cells = nbformat.read(folder / state / "02_expected_sarsa.ipynb", 4).cells
-    shown = opened(state, "02_expected_sarsa").locator(".jp-Notebook .jp-Cell")
-    code = [k for k, cell in enumerate(cells) if cell.cell_type == "code"]
-    for k in code:
-        assert shown.nth(k).locator(".jp-InputArea-editor").count() == (
-            not prose.says(cells[k].source)
-        )
-    assert any(prose.says(cells[k].source) for k in code)
-
-
-def test_a_link_to_another_chapter_leads_to_its_file(opened):
-    link = opened("source", "02_expected_sarsa").locator(SHOWN).get_by_text("Chapter 1").first
-    assert "source/01_mdp_and_nmpc.ipynb" in link.get_attribute("href")
 
 
 def test_a_link_to_an_equation_leads_there(opened):

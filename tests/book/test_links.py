@@ -7,7 +7,6 @@ from pathlib import Path
 import nbformat
 import pytest
 import yaml
-from bs4 import BeautifulSoup
 from driver import project
 
 from nmpcrl.claims.paper_claims import CLAIMS
@@ -122,28 +121,3 @@ def test_the_page_of_references_has_what_is_cited():
     cited = {key for page in SOURCES for _, to, key in links(page) if to == "references.md"}
     cited |= set(re.findall(r"references\.md#(\w+)", str(DEPARTURES)))
     assert set(ENTRIES) == cited
-
-
-@pytest.fixture(scope="module")
-def built(site) -> dict[str, BeautifulSoup]:
-    """The pages of the built book."""
-    paths = (site / "book").glob("*.html")
-    return {path.stem: BeautifulSoup(path.read_text(), "html.parser") for path in paths}
-
-
-@each_page
-def test_every_link_of_the_built_page_leads_to_something(built, page):
-    for link in built[page].article.select("a[href]"):
-        target, _, label = link["href"].partition("#")
-        if target.startswith(("http", "..", "mailto")) or not (label or target):
-            continue
-        assert not target or (target.removesuffix(".html") in built or target.endswith(".ipynb"))
-        if label and "=" not in label and target.endswith((".html", "")):  # else a setting
-            home = built[target.removesuffix(".html") or page]
-            assert home.find(id=label), link["href"]
-
-
-def test_numbers_of_the_built_page_are_those_of_its_source(built):
-    text = " ".join(built["02_expected_sarsa"].article.get_text().split())
-    for label, words in numbers("02_expected_sarsa").items():
-        assert (f"\\tag{{{words[5:-1]}}}" if label.startswith("eq-") else f"{words}.") in text

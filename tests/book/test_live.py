@@ -32,13 +32,6 @@ def test_what_is_inline_becomes_a_link_to_a_file_that_pages_share_if_it_is_the_s
         live.share(figure_of("p { margin: 0 }", "c"), Path("book/02.ipynb"), tmp_path)
 
 
-def test_the_files_of_runs_are_written_if_a_figure_asks_for_them(tmp_path):
-    live.add_runs([notebook_of("<p>none</p>"), notebook_of()], tmp_path)
-    assert list(tmp_path.iterdir()) == []
-    live.add_runs([notebook_of("<p>none</p>", '<figure data-figure="runs">')], tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [f"runs_{k}.js" for k in "ABCDEF"]
-
-
 def test_a_notebook_has_one_seed_in_one_layout_and_asks_for_nothing(browser, site, tmp_path):
     notebook = nbformat.read(site / "book/05_results.ipynb", 4)
     (html,) = [text for text in live.shown(notebook) if live.ASKS in text]

@@ -35,9 +35,11 @@ def opened(site, browser) -> Iterator[Callable[..., Tab]]:
     """Opens the page of a live figure as a reader with these settings would."""
     contexts = []
 
-    def with_settings(figure, *, script="", using=browser, **settings):
+    def with_settings(figure, *, script="", clock=False, using=browser, **settings):
         contexts.append(using.new_context(**settings))
         page = contexts[-1].new_page()
+        if clock:
+            page.clock.install()
         if script:
             page.add_init_script(script)
         return Tab(page, site, figure)
@@ -326,10 +328,9 @@ def test_on_a_telephone_in_the_dark(opened, figure):
 
 @each_figure
 def test_nothing_moves_by_itself(opened, figure):
-    tab = opened(figure).begun()
+    tab = opened(figure, clock=True).begun()
     tab.said()
     tab.figure.evaluate(CHANGES)
-    tab.page.clock.install()
     tab.page.clock.run_for(2000)
     tab.shown()
     assert tab.page.evaluate("window.changes") == 0

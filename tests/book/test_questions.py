@@ -60,19 +60,6 @@ def test_an_answer_that_can_be_typed_gets_a_place_above_its_folded_code():
     assert solution.source.endswith("\n\nThus.\n\n```python\nx = 2\n```\n\n</details>")
 
 
-def test_code_is_shown_empty_with_its_check():
-    page = questions.placed(executed("def x():\n    return ...", [{"text/plain": "Right."}]))
-    _, code, _ = page.cells
-    assert code.source == "def x():\n    return ...\n\ncheck.a(x)"
-    assert "hide-input" not in code.metadata["tags"]
-    assert code.outputs == []
-
-
-def test_a_page_without_exercises_stays_as_it_is():
-    plain = new_notebook(cells=[new_code_cell("1 + 1"), new_markdown_cell("Two.")])
-    assert questions.placed(plain) == plain
-
-
 def written(folder: Path) -> str:
     """A page with an exercise of each kind, whose scripts are those of the book."""
     places = []
@@ -120,13 +107,8 @@ def answered(tab, name: str, answer: str) -> str:
     ("name", "answer", "what"),
     [
         ("weight", "2.5", "Right: 2.5 kg."),
-        ("weight", "2,505", "Right: 2.5 kg."),
-        ("weight", "25e-1", "Right: 2.5 kg."),
-        ("weight", "2.5 kg", "Right: 2.5 kg."),
-        ("weight", "25·10⁻¹", "Right: 2.5 kg."),
-        ("weight", "0.25*10^1", "Right: 2.5 kg."),
-        ("weight", "250 %", "Right: 2.5 kg."),
-        ("weight", "2,500", "Right: 2.5 kg."),
+        *(("weight", one, "Right: 2.5 kg.") for one in ("2,505", "25e-1", "2.5 kg", "250 %")),
+        *(("weight", one, "Right: 2.5 kg.") for one in ("25·10⁻¹", "0.25*10^1", "2,500")),
         ("many", "2600", "Right: 2600."),
         ("weight", "5", "That is </script> twice as much. The next hint is open above."),
         ("weight", "-2.5", "Not right: look at the sign."),
@@ -161,11 +143,6 @@ def test_the_keyboard_alone_chooses_and_checks(tab):
     assert said(tab, "reason").inner_text() == "Right: it is b."
 
 
-def test_nothing_chosen_is_no_miss_of_a_letter(tab):
-    tab.locator('[data-exercise="reason"]').get_by_role("button", name="Check").click()
-    assert said(tab, "reason").inner_text().startswith("Choose one")
-
-
 def test_each_miss_opens_the_next_hint_and_says_so(tab):
     opened = "[...document.querySelectorAll('details[open] summary')].map(one => one.innerText)"
     assert tab.evaluate(opened) == []
@@ -185,7 +162,7 @@ def test_the_last_answer_of_each_exercise_is_kept(tab):
     assert said(tab, "many").inner_text().startswith("Not right")
 
 
-@pytest.mark.parametrize("stored", ["{", "3", "[]", '{"weight": 3}', '{"weight": {}}'])
+@pytest.mark.parametrize("stored", ["{", "[]", '{"weight": 3}'])
 def test_what_is_stored_may_be_spoilt(tab, stored):
     tab.evaluate("stored => localStorage.setItem('nmpcrl.exercises', stored)", stored)
     tab.reload()
@@ -196,13 +173,6 @@ def test_a_browser_that_keeps_nothing_still_checks(tab):
     tab.add_init_script("Storage.prototype.setItem = () => { throw new Error('full') }")
     tab.reload()
     assert answered(tab, "weight", "2.5") == "Right: 2.5 kg."
-
-
-def test_what_is_said_is_announced_and_every_field_has_a_name(tab):
-    assert said(tab, "weight").get_attribute("role") == "status"
-    assert tab.get_by_role("textbox", name="Your answer", exact=True).count() == 2
-    assert tab.get_by_role("group", name="Your answer").get_by_role("radio").count() == 3
-    assert tab.get_by_role("form", name="Exercise 1.2").count() == 1
 
 
 @pytest.mark.parametrize("width", [390, 1400])
