@@ -23,14 +23,6 @@ def test_the_interval_of_a_rate_holds_what_lies_within_two_of_its_own_deviations
         assert away == pytest.approx(z**2 * bound * (1 - bound) / of, abs=1e-12)
 
 
-def test_the_interval_of_a_rate_covers_the_mean_over_layouts_that_differ():
-    rng, chances = np.random.default_rng(1), np.array([0.02, 0.1, 0.4, 0.7, 0.9, 0.98])
-    held = rng.binomial(20, chances, (1000, 6)).sum(axis=1)
-    found = [rate(int(k), 120) for k in held]
-    covered = [one.low <= chances.mean() <= one.high for one in found]
-    assert np.mean(covered) >= CONFIDENCE
-
-
 @pytest.mark.parametrize(("gained", "lost"), [(0, 0), (4, 0), (0, 4), (3, 17), (8, 8)])
 def test_pairs_that_change_go_either_way_with_the_same_chance(gained, lost):
     changed, fewer = gained + lost, min(gained, lost)

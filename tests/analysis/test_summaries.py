@@ -91,16 +91,3 @@ def test_a_run_that_fails_is_named_and_stops_no_other_one(monkeypatch, capsys):
     monkeypatch.setattr(limits, "environment", lambda: {"numba": "absent"})
     with pytest.raises(Failed, match="Refusal: numba is not installed"):
         here(THREE)
-
-
-def test_long_runs_begin_first(trained):
-    short = Experiment("ES", episodes=1, steps=2)
-    experiments = [
-        short,
-        Experiment("frozen", episodes=1, steps=2, horizon=15),
-        Experiment("DES", episodes=1, steps=2),
-        Experiment("RDES", episodes=2, steps=2),
-    ]
-    study = here(experiments)
-    assert [e.learner for e in trained] == ["RDES", "DES", "frozen", "ES"]
-    assert list(study) == experiments

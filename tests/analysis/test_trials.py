@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.trials import evaluations, final_costs, summarise
-from nmpcrl.learning import Learner, SecondSolve, UpdateRule, evaluate, expected_sarsa, frozen
+from nmpcrl.learning import Learner, SecondSolve, UpdateRule, evaluate, frozen
 from nmpcrl.study import Trial, paper, run
 
 THETA = paper.THETA_INIT
@@ -49,14 +49,6 @@ def test_a_run_that_diverges_ends_in_an_infinite_cost(nmpc, at):
     assert found.cost.iloc[-1] == np.inf
     assert found.episode.iloc[-1] == EPISODES
     assert np.isfinite(found.cost.iloc[:-1]).all()
-
-
-def test_each_run_has_its_learner_and_its_seed(nmpc):
-    make = partial(expected_sarsa, alpha=1e-7)
-    trials = [Trial("mine", make, nmpc, THETA, seed, 1, 3) for seed in (4, 5)]
-    found = evaluations(map(run, trials))
-    assert found.seed.tolist() == [4, 4, 5, 5]
-    assert not np.array_equal(found.theta.iloc[1], found.theta.iloc[3])
 
 
 def test_learners_are_compared_with_the_baseline_by_the_last_cost_of_each_run():

@@ -81,15 +81,6 @@ def test_an_expected_step_is_the_mean_of_the_sampled_ones_and_linear(gamma, shar
     np.testing.assert_allclose(linear, np.r_[mean.theta, mean.w], atol=1e-9)
 
 
-def test_sampled_updates_stay_around_the_expected_ones():
-    chain, rule = Chain(share=0.5), semi_gradient(0.01)
-    paths = [follow(chain, rule, 50, rng=np.random.default_rng(seed)) for seed in range(300)]
-    np.testing.assert_allclose(np.mean(paths, axis=0), follow(chain, rule, 50), atol=0.02)
-    certain = gradient_td(ALPHA, ALPHA, CHAIN.gamma)  # the chain updates its first state alone
-    sampled = follow(CHAIN, certain, 20, rng=np.random.default_rng(0))
-    np.testing.assert_array_equal(sampled, follow(CHAIN, certain, 20))
-
-
 @pytest.mark.parametrize("name", ["gamma", "share"])
 def test_a_probability_outside_zero_and_one_is_refused(name):
     with pytest.raises(ValueError, match=rf"{name} = 1\.5 must lie in \[0, 1\]"):

@@ -19,8 +19,8 @@ from nmpcrl.analysis.summary import summarise
 from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims import own_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measurement, audit, measured
-from nmpcrl.claims.by_runs import AtLeast, AtMost, halves
-from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN, kept_without_noise
+from nmpcrl.claims.by_runs import halves
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Observations, judge
 from nmpcrl.claims.timing import WAITED, decide
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
@@ -138,14 +138,6 @@ def test_each_border_belongs_to_yes(name, changes, apart, outcome):
         assert verdict_on(name, some, paths(some, apart, SOME)).outcome == PARTLY
 
 
-def test_two_that_failed_are_not_the_same_policy_and_cost_the_same():
-    runs = study(of("all", **FAILED))
-    found = outcomes(runs)
-    lost = outcomes(runs, {e: np.full((3, 3), np.nan) for e in paths(runs)})
-    assert found["C5"] == lost["C5"] == found["B2"] == NOT
-    assert found["B1"] == found["B3"] == found["B4"] == REPRODUCED
-
-
 def test_robots_are_as_far_apart_as_they_ever_come_whatever_their_headings():
     one, other = np.zeros((2, 4, 3))
     other[2], other[3] = (3.0, 4.0, 0.0), (0.0, 0.0, 9.0)
@@ -196,30 +188,6 @@ def test_short_runs_and_missing_ones_decide_nothing(runs, rollouts, open_):
     assert {name for name, outcome in found.items() if outcome == UNDECIDABLE} == open_
 
 
-def test_layouts_are_judged_one_by_one_and_only_where_the_learner_was_run():
-    worse = both(lambda e: BAD if e.learner == "DES" and e.layout == "B" else {})
-    runs = study(worse, layouts=("A", "B"))
-    assert verdict_on("C1", runs).by_layout == {"A": NOT, "B": REPRODUCED}
-    some = runs[(runs.learner != "random") | (runs.layout == "B")]
-    assert verdict_on("B2", some).by_layout == {"B": NOT}
-
-
-def test_a_verdict_has_the_numbers_behind_it():
-    sizes = {"inside_small": 7, "inside_medium": 2, "inside_large": 1, "eval_inside_large": 3}
-    runs = study(both(of("RDES", **sizes, inputs=4, outside=6), of("DES", SOME, **BAD)))
-    c7, c1 = verdict_on("C7", runs).numbers, verdict_on("C1", runs).numbers
-    assert (c7["inputs"], c7["outside"], c7["steps_done"]) == (40, 60, 390_000)
-    assert [c7[f"inside_{size}"] for size in ("small", "medium", "large")] == [70, 20, 10]
-    assert (c7["eval_inside"], c7["eval_inside_large"]) == ({"RDES": 30}, 30)
-    assert (c1["DES_wrong"], c1["RDES_wrong"]) == ((4, 10), (0, 10))
-    assert (c1["DES_median"], c1["RDES_median"]) == (1.0, 1.0)
-    runs = study(both(of("RDES", (0,), **FAILED), of("GES", (1,), distance=5.0, theta_0=2.0)))
-    c9, c5 = verdict_on("C9", runs).numbers, verdict_on("C5", runs, paths(runs, 1.0, SOME)).numbers
-    assert (c9["failed"], c9["stuck"], [*c9["medians"]]) == (2, 2, [*PAPER])
-    assert (c5["path"], c5["cost"], c5["theta"]) == (0, 0, 0)
-    assert verdict_on("C6", runs).numbers == {"told": 0.5, "alone": 1.0}
-
-
 def test_a_run_costs_less_with_the_probability_that_counts_every_pair_alike():
     runs = study(of("TDC", final_cost=900.0))
     assert own_claims.costs_less(runs, "TDC", "GES").value == 1
@@ -229,15 +197,6 @@ def test_a_run_costs_less_with_the_probability_that_counts_every_pair_alike():
     assert (numbers["better"].value, numbers["second"]) == (1, 0)
     assert numbers["first"] == pytest.approx(0.1)
     assert verdict_on("B1", runs[runs.learner != "GES"]).numbers == {}
-
-
-def test_runs_that_kept_the_constraints_are_counted_with_those_that_were_stopped():
-    runs = study(both(of("RDES", SOME, stopped="diverged"), of("DES", (0,), inputs=1)))
-    found = kept_without_noise(runs, ("DES", "RDES"))
-    assert found.groupby("learner").sum().to_dict("index") == {
-        "DES": {"kept": 8, "stopped": 0},
-        "RDES": {"kept": 10, "stopped": 4},
-    }
 
 
 @pytest.mark.parametrize(
@@ -289,29 +248,6 @@ def test_the_share_achieved_is_1_at_the_possible_cost_0_at_theta_init_and_negati
     shares = thresholds.share_of_possible(runs, {"A": 0.2, "B": 0.0})
     worst = [-np.inf, -np.inf]
     np.testing.assert_allclose(shares, [1.0, 0.0, 0.5, -1.0, *worst, np.nan, np.nan], atol=1e-12)
-
-
-FIELDS = dict.fromkeys(("name", "statement", "question", "measured", "border", "would_change"), "X")
-FIELDS |= {"threshold": 0.5}
-GAINS, LOSSES = AtLeast(**FIELDS), AtMost(**FIELDS)
-VALUES = pd.DataFrame({"one": np.linspace(0.1, 1.0, 10)})
-
-
-def test_other_borders_give_other_outcomes_and_steady_ones_do_not():
-    borders = [0.05, 0.25, 0.5, 0.95, 1.05]
-    gained, lost = (one.at_borders(VALUES, borders) for one in (GAINS, LOSSES))
-    assert gained.share.tolist() == pytest.approx([1.0, 0.8, 0.6, 0.1, 0.0])
-    assert lost.share.tolist() == pytest.approx([0.0, 0.2, 0.5, 0.9, 1.0])
-    assert gained.outcome.tolist() == [REPRODUCED, PARTLY, PARTLY, NOT, NOT]
-    assert ((gained.low <= gained.share) & (gained.share <= gained.high)).all()
-    assert LOSSES.steady(VALUES / 10)
-    assert not LOSSES.steady(VALUES)
-    ratios = replace(LOSSES, nothing=1.0)  # then 0.75 and 0 stand beside 0.5
-    assert ratios.steady(VALUES + 1)
-    assert not ratios.steady(0.5 + VALUES / 5)
-    unknown = VALUES * np.nan
-    assert GAINS.at_borders(unknown, borders).empty
-    assert GAINS.steady(unknown)
 
 
 @pytest.mark.parametrize(
@@ -437,9 +373,3 @@ def test_the_audit_measures_kinks_memory_and_the_dropped_term(on_boundary):
     found = measured(Experiment("GES"), records, Curvature(size, size, size / 4))
     assert (found.kinks, found.dropped) == (on_boundary, 0.25)
     assert found.memory == pytest.approx(1)
-
-
-def test_all_claims_are_judged_in_order():
-    runs = study()
-    assert list(CLAIMS) == [f"C{i}" for i in range(1, 10)]
-    assert [one.claim for one in judge(EVERY, runs, paths(runs), timings())] == list(EVERY)

@@ -6,15 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import thresholds
 from nmpcrl.claims.failure_modes import (
     OVER_PREDICTED,
-    WELL,
     Mechanism,
     ending,
-    failure_modes,
     mechanism,
     rise,
 )
@@ -130,25 +127,6 @@ def test_the_worst_ending_of_a_rollout_counts(change, name):
     for place, value in change.items():
         states[place] = value
     assert ending(states, TASK) == name
-
-
-def test_every_run_that_learned_has_an_ending_and_one_that_went_wrong_a_mechanism():
-    lost, border, above = np.full(THROUGH.shape, np.nan), [1010.0] * 4, [1010.1] * 4
-    diverged = made(seed=1, cost=GOOD)
-    diverged.episodes["cost"][20:] = 150.1
-    stopped = made("GES", cost=GOOD, stopped="diverged: w", failed=(slice(30, 40), 1))
-    rows = [
-        (made(alpha_phi2=(WINDOW, 3.0)), ["arrived", "without noise", "overshoot", 10]),
-        (diverged, ["arrived", "training", OTHER, 30]),
-        (made(seed=2, cost=GOOD, states=lost), ["failed", "", WELL, None]),
-        (stopped, ["arrived", "stopped", "solver", 30]),
-        (made("DES", (START_COST, *border), seed=1), ["arrived", "", WELL, None]),
-        (made("DES", (START_COST, *above), seed=2), ["arrived", "without noise", OTHER, 0]),
-        *[(made("frozen", GOOD, seed=seed), ["", "", "", None]) for seed in range(3)],
-    ]
-    runs = {run.name: run for run, _ in rows}
-    frame = failure_modes(runs, table(runs), runs).astype(object)
-    assert frame.where(frame.notna(), None).to_numpy().tolist() == [mode for _, mode in rows]
 
 
 # Final cost beside theta_init's 100, and whether the run improves, worsens and solves.

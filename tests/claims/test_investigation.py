@@ -137,14 +137,6 @@ def test_a_table_is_registered_by_the_commit_before_its_first_row():
     assert published.about("early")["registered"] == "abc"
 
 
-@pytest.mark.parametrize(
-    ("answer", "said"), [(lambda _: True, "gives True and no"), (lambda _: 1 / 0, "division by")]
-)
-def test_a_question_that_fails_is_named(answer, said):
-    with pytest.raises(Refusal, match=f"the question 'odd' .*{said}"):
-        toy(questions=(Question("odd", "?", NOT, answer),)).answers(pd.DataFrame())
-
-
 def with_paths(setting, place, episodes, seed):
     row = run(setting, place, episodes, seed) | {"seconds": 7.0}
     return row if place == "a" else row | {"path": [[seed, 1], [2, -3]]}
@@ -217,18 +209,6 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay():
     assert [one["rows"] for one in batches] == [{"judge": 3}, {"tune": 4}]
     assert [one["epochs"]["control"] for one in batches] == [EPOCHS["control"], 99]
     assert [*later.conditions("judge")] == [("judge", "best", place, 0) for place in "bac"]
-
-
-def test_batches_that_do_not_count_their_rows_are_of_the_first_part_of_history():
-    first, counted = {"date": "then"}, {"rows": {"tune": 2}, "epochs": {"control": 7}}
-    entry = {"batches": [first, counted]}
-    assert published.epochs({}, "tune") == {}
-    assert published.epochs(entry, "tune")["control"] == 7
-    assert published.epochs(entry, "judge") == dict.fromkeys(EPOCHS, 1)
-    assert published.without(entry["batches"], {"tune"}) == [first]
-    table = pd.DataFrame({"part": ["tune"] * 2 + ["judge"]})
-    published.write("data", table, batch={"rows": {"judge": 1}}, earlier=[first, counted])
-    assert published.about("data")["batches"] == [counted, {"rows": {"judge": 1}}]
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])

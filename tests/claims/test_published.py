@@ -14,9 +14,8 @@ from nmpcrl.analysis.search import Search, SearchResult
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import publish, published
 from nmpcrl.claims.assumptions import Measurement
-from nmpcrl.claims.paper_claims import WIDER_THAN
-from nmpcrl.claims.published import FOLLOWED, Damaged, Published, load
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.published import FOLLOWED, Published, load
+from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.study import Experiment, paper, run, sweep
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import frozen_arm
@@ -104,14 +103,6 @@ def test_searches_times_and_their_origin_are_read_as_they_were(known):
     assert store.about("searches")["batches"][0]["machine"] == fingerprint()
 
 
-def test_a_study_without_times_searches_and_followed_runs_is_read(summaries, folder):
-    publish.publish_runs(summaries, dict.fromkeys(summaries, "N = 2"), anew=True)
-    found = load()
-    assert (found.searches, dict(found.timed), len(found.timings)) == ({}, {}, 0)
-    assert not any("theta" in one.episodes for one in found.summaries.values())
-    assert {one.outcome for one in found.verdicts} == {UNDECIDABLE}
-
-
 def test_the_same_content_gives_the_same_bytes_and_nothing_of_the_earlier(known, summaries, folder):
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     fewer = [RUNS[0], frozen_arm(RUNS[0])]
@@ -187,14 +178,6 @@ def scaled(one, factor):
     return replace(one, evaluations=one.evaluations | {"cost": factor * one.evaluations["cost"]})
 
 
-def test_what_is_missing_is_refused_before_a_number_is_shown(known, folder):
-    for path, said in ((folder / "runs.npz", "npz cannot be read"), (folder, "git checkout")):
-        path.unlink() if path.is_file() else shutil.rmtree(path)
-        forget()
-        with pytest.raises(Damaged, match=said):
-            load()
-
-
 @pytest.mark.parametrize(
     ("width", "outcomes"), [(0.02, [PARTLY, REPRODUCED]), (0.07, [UNDECIDABLE, REPRODUCED])]
 )
@@ -209,15 +192,3 @@ def test_times_are_published_if_they_decide_all_claims_about_time(
     assert [verdict.outcome for verdict in publish.publish_timing()] == outcomes
     assert (len(load().timings) == 3) == (UNDECIDABLE not in outcomes)
     assert list(load().rows) == list(RUNS)
-
-
-def test_the_projects_own_study_is_judged_in_order(monkeypatch):
-    monkeypatch.setenv("NMPCRL_PUBLISHED", "")
-    assert published.folder().parts[-2:] == ("book", "published")
-    verdicts = published.load().verdicts
-    claims = [one.claim for one in verdicts]
-    for wider, narrow in WIDER_THAN.items():
-        assert claims[claims.index(narrow) + 1] == wider
-    assert [one[0] for one in claims[-4:]] == ["B"] * 4
-    assert {one.claim for one in verdicts if one.outcome == NOT} == {"C2", "C8"}
-    assert Published().verdicts == ()

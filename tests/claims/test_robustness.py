@@ -11,17 +11,14 @@ from nmpcrl.claims import evidence
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import (
     WHOLE,
-    departure,
-    groups,
     part_changes,
     readings_of_des,
     robustness_map,
 )
 from nmpcrl.claims.rule import judge
 from nmpcrl.claims.thresholds import divergence
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design
-from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import PAPER
 
 LITERAL, CLIPPED, HOT = "literal", "no clipping", "alpha x 3"
@@ -94,38 +91,6 @@ def test_a_part_changes_a_verdict_only_if_the_parts_differ(other, changes):
     layouts, counts = {"A": PARTLY, "B": other}, {"all": (19, 20), "A": (9, 10), "B": (10, 10)}
     verdict = Verdict("C1", "", REPRODUCED, by_layout=layouts, counts=counts)
     assert part_changes([verdict]).changes.tolist() == [False, changes, False]
-
-
-def test_every_row_has_the_letter_of_its_departure(found):
-    letters = found.groupby("variant", sort=False).departure.unique().str.join("").tolist()
-    assert letters == ["", "B", "B", "C", "C", "G", "E", ""]
-    assert {departure(name) for name in design.VARIANTS} <= {*DEPARTURES, ""}
-
-
-@pytest.mark.parametrize(
-    ("row", "field", "here", "base"),
-    [
-        ("layout D", "layout", {"D"}, {"A"}),
-        ("decay per episode", "decay", {"episode"}, {"step"}),
-        (LITERAL, "decay", {"step"}, {"step"}),
-    ],
-)
-def test_a_part_is_compared_with_the_rest_and_a_variant_with_its_own_cells(
-    runs, row, field, here, base
-):
-    mine, others = groups(runs, row)
-    assert (set(mine[field]), set(others[field])) == (here, base)
-    assert set(others.variant) == {design.MAIN_TABLE}
-    if row == LITERAL:
-        origin = mine.groupby("learner").variant.unique().map(list).to_dict()
-        assert origin["DES"] == origin["RDES"] == [LITERAL]
-        assert origin["ES"] == origin["GES"] == origin["frozen"] == [design.MAIN_TABLE]
-
-
-def test_runs_that_are_too_short_decide_nothing_and_change_nothing(runs, paths):
-    cut = robustness_map(runs.assign(episodes=4), paths)
-    assert set(cut.outcome) == {UNDECIDABLE}
-    assert not cut.changes.any()
 
 
 def test_how_often_des_diverges_is_tested_on_its_own_and_not_by_the_p_of_the_claim():

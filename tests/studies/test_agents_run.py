@@ -6,10 +6,10 @@ import sys
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.suite import Robot, entry, followed, judge
+from nmpcrl.analysis.suite import Robot, followed, judge
 from nmpcrl.studies.agents import AGENTS
 from nmpcrl.studies.agents_run import SAC, TD3, curve, seen, trained
-from nmpcrl.study import ParameterError, paper
+from nmpcrl.study import paper
 from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.robot import RobotEnv
@@ -101,14 +101,6 @@ def test_a_share_of_the_turn_rates_bounds_what_is_applied():
     policy = TD3.with_settings(turn=0.25, gradient=0.1)(Robot(LAYOUT, 2, seed=0))
     actions = np.array([policy(START + 100 * np.eye(11)[i]) for i in range(11)])
     assert (abs(actions) <= [0.6, np.pi / 8]).all()
-
-
-def test_a_name_is_an_agent_with_its_settings_and_unknown_ones_are_refused():
-    assert entry("SAC[width=32]", AGENTS).settings["width"] == 32
-    assert str(entry("nmpcrl.studies.agents_run:SAC")).endswith("SAC")
-    for name in ("SAC[width=32.5]", "SAC[alpha=1]"):
-        with pytest.raises(ParameterError):
-            entry(name, AGENTS)
 
 
 def test_without_the_extra_one_sentence_says_what_is_missing(monkeypatch):

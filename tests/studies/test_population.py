@@ -1,9 +1,5 @@
 """The runs in drawn layouts: their parts, and answers to evidence that is made up."""
 
-from dataclasses import replace
-from itertools import pairwise
-from types import SimpleNamespace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,8 +11,8 @@ from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import population
 from nmpcrl.studies.difficulty import MEASURES, PILOT
-from nmpcrl.studies.population import EXPECTED, JUDGED, PARTS, PICTURE, POPULATION, seed_of
-from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS
+from nmpcrl.studies.population import EXPECTED, JUDGED, PARTS, POPULATION, seed_of
+from nmpcrl.study.drawn import JUDGE, LAYOUTS
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 
 NAMES = [*JUDGE][:20]
@@ -77,29 +73,6 @@ def test_each_run_has_its_frozen_arm_and_a_counterpart_among_the_judged():
     assert len({*seeds}) == len(seeds)
 
 
-def test_a_row_is_the_summary_s_with_its_path_in_millimetres(made_up, monkeypatch):
-    found = made_up(layouts=(JUDGE["J001"],), seeds=(seed_of("J001", 1),))
-    states = np.full((131, 3), np.nan)
-    states[:-1] = 0.12345
-    changed = {e: replace(one, states=states) for e, one in found.summaries.items()}
-    monkeypatch.setattr(population, "SUMMARIES", SimpleNamespace(fetch=changed.get))
-    rows = []
-    for one, setting in POPULATION.conditions("judge again").items():
-        if one.place == "J001":
-            row = population.of_run(setting, "J001", 300, seed_of("J001", one.k))
-            rows.append(one._asdict() | row)
-    assert {*rows[0]} - {*POPULATION.table().columns} <= {"positions"}
-    made = population.of_table(pd.DataFrame(rows))
-    assert made.runs.final_cost.tolist() == pytest.approx(
-        [changed[e].evaluations["cost"][-1] for e in population.experiments(pd.DataFrame(rows))]
-    )
-    assert {e.learner for e in made.paths} == {"RDES", "GES"}
-    for path in made.paths.values():
-        assert (path[:-1] == 0.123).all()
-        assert np.isnan(path[-1]).all()
-    assert made.runs.cost_ratio.notna().all()
-
-
 def test_a_claim_holds_in_a_layout_where_more_than_half_of_its_answers_are_yes():
     cells = [("J001", "step", True), ("J001", "episode", False)]
     cells += [("J002", "step", True), ("J002", "episode", True)]
@@ -134,17 +107,6 @@ def test_a_weaker_question_counts_in_drawn_layouts_as_it_does_in_a_to_f(overlap,
         assert verdict.settled(Observations(runs)).outcome == outcome
 
 
-def test_the_nearest_comes_first_and_only_a_whole_one_confirms(drawn):
-    assert all(a >= b for a, b in pairwise(drawn.tried.whole))
-    assert [*drawn.tried.whole] == [*(drawn.tried[[*PICTURE]] == 1).sum(axis=1)]
-    some = pd.DataFrame({"whole": [3, 1]})
-    near = population.whole_picture(some)
-    assert (near.outcome, near.numbers) == (NOT, {"tried": 2.0, "most": 3.0})
-    found = population.whole_picture(some + 1)
-    assert (found.outcome, found.beside) == (REPRODUCED, {"settings": (1, 2)})
-    assert found.words == "found by search"
-
-
 def test_the_measure_that_tells_success_is_ahead_of_noise(measures):
     tuned = [made("tune", "ES", n, better=n != "T01") for n in LAYOUTS if n[0] == "T"]
     runs = pd.concat([judged(), pd.DataFrame(tuned)], ignore_index=True)
@@ -164,39 +126,6 @@ def test_closing_gaps_is_confirmed_by_both_halves_only(measures):
     assert population.closing_gaps(measures, success | True).outcome == NOT
 
 
-FIRST, SECOND = [*COMPARED][:2]
-LONGER = [
-    made("judge", "ES", name, better=name == FIRST) for name in [*COMPARED][:8]
-] + [
-    made(f"N = {n}", "ES", name, better=(n, name) == (40, SECOND))
-    for n in (20, 40) for name in [*COMPARED][:8]
-]  # fmt: skip
-AWAY = {"decay": "episode", "better": False, "distance": 5, "moved": 0.0, "worth": 0.9}
-TRAPPED = [made("judge", "ES", name, distance=0.1) for name in NAMES]
-TRAPPED += [made("judge", "ES", name, **AWAY) for name in FAILING]
-TRAPPED[-1] |= {"worth": 1.1, "delta_last": 3.0}
-ENDED = {"decay": "episode", "stopped": "diverged: theta", "over": 0.01, "steps_done": 10 * 130}
-STOPPED = [made("judge", "RDES", name, **ENDED) for name in NAMES]
-FINISHED = [made("judge", "RDES", name) for name in NAMES]
-
-
-@pytest.mark.parametrize(
-    ("name", "rows", "outcome", "counts"),
-    [
-        ("horizon", LONGER, PARTLY, [(6, 7)]),  # asked where the short one fails
-        ("trap", TRAPPED, PARTLY, [(3, 4), (3, 4)]),  # of layouts, and of runs
-        ("accurate and worse", TRAPPED, PARTLY, [(3, 4), (3, 4)]),
-        ("early overshoot", STOPPED + FINISHED, REPRODUCED, [(20, 20), (20, 20)]),
-        ("early overshoot", [one | {"steps_done": 100 * 130} for one in STOPPED], NOT,
-         [(20, 20), (0, 20)]),
-        ("early overshoot", FINISHED, UNDECIDABLE, [(0, 0), (0, 0)]),
-    ],
-)  # fmt: skip
-def test_questions_are_answered_by_their_rule(name, rows, outcome, counts):
-    answer = POPULATION.asked[name].answer(population.Drawn(pd.DataFrame(rows), {}, None))
-    assert (answer.outcome, [*answer.counts.values()]) == (outcome, counts)
-
-
 def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
     stops = pd.DataFrame({10: [0.2, 0.2, np.nan, 0.1], 20: [0.25, 0.4, 0.1, np.nan], 40: 0.2})
     assert population.gaps_and_horizon(stops).counts == {"layouts the same": (1, 3)}
@@ -205,12 +134,3 @@ def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
 def test_a_cliff_is_where_a_little_more_theta_c_costs_half():
     answer = population.cliff(pd.Series({"A": 0.0, "B": 0.6, "C": 1.4, "D": 0.1}))
     assert (answer.counts, answer.numbers) == ({"layouts": (2, 4)}, {"most": 1.4})
-
-
-def test_questions_whose_rows_are_missing_are_not_decidable(drawn):
-    first = POPULATION.table().query("part == 'judge' and arm == 'ES step'")
-    found = POPULATION.answers(first)
-    assert {name for name, one in found.items() if one.outcome != UNDECIDABLE} == {
-        "ES improves", "closing gaps", "gaps and horizon", "trap", "accurate and worse", "cliff",
-        "whole picture",
-    }  # fmt: skip

@@ -70,13 +70,6 @@ def test_a_late_replay_fits_what_a_uniform_one_does_where_there_is_one_batch_and
     assert late.predict(middle) > network.predict(middle) + 0.2  # late targets are 1
 
 
-def test_a_late_replay_changes_what_a_network_learns():
-    plain, recent = (
-        shifting("once", ("RDES", "told", one), "S01", 2 * EVERY, 0) for one in ("plain", "recent")
-    )
-    assert plain["series"][-1] != recent["series"][-1]
-
-
 @pytest.fixture
 def trained(monkeypatch):
     """Nothing is trained: each episode adds the number that is the learner to theta."""

@@ -1,4 +1,4 @@
-"""The answers of worlds that change, of tables in which they can be told by hand."""
+"""What is counted in worlds that change; `tests/golden` holds the answers of published rows."""
 
 import numpy as np
 import pandas as pd
@@ -6,7 +6,7 @@ import pytest
 
 from nmpcrl.analysis.encounters import crowding
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.studies.worlds import CHANGES, PARTS, REMEDY, WORLDS, back, noticing
+from nmpcrl.studies.worlds import PARTS, WORLDS, back, noticing
 from nmpcrl.study.drawn import SCENARIOS
 
 COLUMNS = [*WORLDS.table().columns]
@@ -49,64 +49,16 @@ def test_an_alarm_where_the_map_is_true_is_false_and_a_change_unnoticed_counts_w
     assert noticing([50, 100], []) == (50, 0.0)
 
 
-LOWER, HIGHER, ALARMS = [0.9] * 60, [1.1] * 60, [54, 104, 154, 204, 254]
-PAPER_S = rows("terminal", "diagonal", cost=lambda i: 1.2 if i < 12 else 0.9)
-for row in PAPER_S[24:40:2]:  # with the 12 above the paper's cost fails in 20 of 30 layouts
-    row["arrived"] = False
-
-
-@pytest.mark.parametrize(
-    ("some", "expected"),
-    [
-        ([rows("moving", "known init", cost=100.0),
-          rows("moving", "extrapolated init", cost=106.0, inside=lambda i: i // 20),
-          rows("moving", "frozen init", cost=121.0, inside=3),
-          rows("moving", "frozen ES", cost=lambda i: 105.0 if i < 10 else 107.0),
-          rows("moving", "extrapolated ES", inside=lambda i: i % 2)],
-         {"a velocity is enough": (REPRODUCED, 40, 40),
-          "a frozen view costs more": (REPRODUCED, 40, 40),
-          "collisions": (PARTLY, 20, 40),
-          "learning or looking": (PARTLY, 10, 40),
-          "safer by learning": (PARTLY, 10, 30)}),
-        ([rows("model", f"{fault} {how}", cost=cost)
-          for fault, adds in (("drift", 94.0), ("speed", 96.0))
-          for how, cost in (("init", 100.0), ("oracle", 99.0), ("ES", 95.0), ("ES+model", adds),
-                            ("grid", 94.0 if fault == "drift" else 96.0))],
-         {"a perfect model": (REPRODUCED, 24, 24),
-          "misfit of theta_c": (PARTLY, 12, 24),
-          "only drift adds": (REPRODUCED, 12, 12),
-          "recovered by weights": (REPRODUCED, 24, 24)}),
-        ([*(rows(part, "ES told plain", series=LOWER, cost=0.9) for part in CHANGES),
-          rows("every 50", "ES never plain", series=HIGHER),
-          rows("once", f"remedy {REMEDY}", cost=0.8),
-          rows("every 50", "ES cost plain", series=HIGHER, events=ALARMS)],
-         {"learning pays in a changing world": (REPRODUCED, 10, 10),
-          "being told": (REPRODUCED, 10, 10),
-          "detecting": (NOT, 0, 10),
-          "a chart on the cost": (REPRODUCED, 10, 10),
-          "begun anew": (REPRODUCED, 10, 10),
-          "back soon": (REPRODUCED, 10, 10)}),
-        # below 1 in 59 of 119 other layouts for the first 60, in 60 of 119 for the rest
-        ([rows("carry", "frozen", series=[1.0] * 120)[:1],
-          rows("carry", "ES", series=[0.5] * 60 + [1.5] * 60)],
-         {"carried over": (PARTLY, 60, 120)}),
-        ([PAPER_S, rows("terminal", "full", cost=1.0),
-          rows("terminal", "learned", cost=lambda i: 1.1 if i < 19 else 0.8)],
-         {"full terminal cost": (NOT, 0, 20),
-          "learned terminal cost": (REPRODUCED, 19, 20),
-          "a richer terminal cost pays": (PARTLY, 23, 30)}),
-        ([rows("gradient", "0.05", cost=lambda i: 0.95 if i < 10 else 0.85)],
-         {"noise and the gradient": (PARTLY, 10, 20)}),
-    ],
-)  # fmt: skip
-def test_questions_are_answered_by_their_rule(some, expected):
-    found = answered(*some)
-    said = {name: (found[name].outcome, next(iter(found[name].counts.values())))
-            for name in expected}  # fmt: skip
-    assert said == {name: (outcome, (yes, of)) for name, (outcome, yes, of) in expected.items()}
-    numbers = {"a frozen view costs more": {"median ratio": 1.21},
-               "back soon": {"median episodes": 5.0}}  # fmt: skip
-    assert all(found[name].numbers == numbers[name] for name in {*expected} & {*numbers})
+def test_a_cost_of_1_solves_and_a_terminal_cost_is_asked_where_the_papers_does_not_solve():
+    papers = rows("terminal", "diagonal", cost=lambda i: 1.2 if i < 12 else 0.9)
+    for row in papers[24:40:2]:  # with the 12 above it fails in 20 of 30 layouts
+        row["arrived"] = False
+    learned = rows("terminal", "learned", cost=lambda i: 1.1 if i < 19 else 0.8)
+    found = answered(papers, rows("terminal", "full", cost=1.0), learned)
+    said = [
+        (one.outcome, *one.counts.values()) for name, one in found.items() if "terminal" in name
+    ]
+    assert said == [(NOT, (0, 20)), (REPRODUCED, (19, 20)), (PARTLY, (23, 30))]
 
 
 @pytest.mark.parametrize(
