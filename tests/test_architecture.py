@@ -30,20 +30,8 @@ def cited(text: str) -> set[str]:
     return {letter for group in groups for letter in re.findall(r"[A-Z]", group)}
 
 
-def test_departures_are_lettered_without_a_gap():
-    assert list(DEPARTURES) == [chr(ord("A") + i) for i in range(len(DEPARTURES))]
-
-
-def where_departures_are_cited() -> list[Path]:
+def test_departures_are_lettered_and_each_is_cited_where_it_is_made():
     pages = [*(ROOT / "book").glob("*.md"), *(ROOT / "book").glob("*.ipynb")]
-    return [path for path in MODULES + sorted(pages) if path.name != "departures.py"]
-
-
-def test_every_departure_is_cited_where_it_is_made():
-    texts = [path.read_text() for path in where_departures_are_cited()]
-    assert set(DEPARTURES) <= set().union(*map(cited, texts))
-
-
-def test_every_citation_of_a_departure_exists():
-    for path in where_departures_are_cited():
-        assert cited(path.read_text()) <= set(DEPARTURES), path
+    paths = [path for path in MODULES + sorted(pages) if path.name != "departures.py"]
+    assert list(DEPARTURES) == [chr(ord("A") + i) for i in range(len(DEPARTURES))]
+    assert set().union(*(cited(path.read_text()) for path in paths)) == set(DEPARTURES)

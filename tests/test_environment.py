@@ -49,9 +49,3 @@ def test_all_places_name_the_same_pythons():
     assert makefile[1].split() == PYTHONS
     assert workflow["jobs"]["pythons"]["strategy"]["matrix"]["python"] == PYTHONS
     assert PROJECT["tool"]["mypy"]["python_version"] == PYTHONS[0]
-
-
-def test_the_citation_has_the_version_and_the_licence_of_the_package():
-    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
-    for name in ("version", "license"):
-        assert citation[name] == PROJECT["project"][name]

@@ -5,8 +5,6 @@ import sys
 
 import pytest
 
-from nmpcrl.study import Experiment, fetch
-
 SLOW = ("torch", "pandas", "matplotlib", "scipy.stats", "numba", "gymnasium")
 LIGHT = (
     *("nmpcrl", "nmpcrl.control", "nmpcrl.learning", "nmpcrl.study", "nmpcrl.bench"),
@@ -18,16 +16,6 @@ from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import Experiment, run
 summarise(run(Experiment("{learner}", episodes=1, steps=3)))
 """
-COMMAND = """
-import sys
-from click.testing import CliRunner
-from nmpcrl.commands import main
-for words in {words}:
-    done = CliRunner().invoke(main, words.split())
-    assert done.exit_code == 0, done.output
-    assert not set({slow}) & set(sys.modules), words
-"""
-WORDS = ("--help", "train --help", "runs --json")
 
 
 @pytest.mark.slow
@@ -45,15 +33,6 @@ def test_nothing_is_imported_before_it_is_needed(script, needed, tmp_path, monke
     command = [sys.executable, "-c", script + LIST]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.stdout.split() == needed, ended.stderr
-
-
-@pytest.mark.slow
-def test_a_command_imports_what_it_needs_and_no_more(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    fetch(Experiment(episodes=1, steps=3))
-    script = COMMAND.format(words=WORDS, slow=SLOW)
-    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stderr
 
 
 def test_learning_has_the_names_that_it_exports_and_no_others():

@@ -2,13 +2,11 @@
 
 import json
 from dataclasses import fields
-from pathlib import Path
 
 import pytest
 
 from nmpcrl.report.run import verdict
 from nmpcrl.study import Experiment, Records, fetch, paper, sweep
-from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.provenance import key
 from nmpcrl.study.store import RUNS
 
@@ -82,21 +80,6 @@ def test_a_run_is_trained_once_listed_and_drawn(command, tmp_path, monkeypatch):
     assert (tmp_path / "a.PNG").read_bytes().startswith(b"\x89PNG\r")
 
 
-def test_the_frozen_run_is_drawn_if_it_is_stored_and_is_what_its_name_says(command):
-    one = Experiment(**SHORT)
-    fetch(one)
-    alone = page(command)
-    fetch(Experiment("GES", **SHORT)).save(RUNS.path_of(frozen_arm(one)))
-    assert page(command) == alone
-    RUNS.path_of(frozen_arm(one)).unlink()
-    fetch(frozen_arm(one))
-    assert page(command) != alone
-
-
-def page(command) -> bytes:
-    return Path(command("show", "ES-").stdout.splitlines()[-1]).read_bytes()
-
-
 @pytest.fixture
 def stored(command):
     """Four runs, of which one has an infinite cost and one was made by other code."""
@@ -139,11 +122,3 @@ def test_a_run_that_could_not_be_stored_is_reported_and_fails(command, monkeypat
     assert done.exit_code == 1
     assert "noise-free cost" in done.stdout
     assert "Next" not in done.stdout
-
-
-def test_a_run_of_other_code_is_shown_and_that_is_said(command, stored):
-    for line in ("runs", "show ES-A-step-seed1"):
-        ended = command(*line.split())
-        assert ended.exit_code == 0, ended.output
-        assert "of other code" in ended.stderr
-    assert "of other code" not in command("show", "ES-A-step-seed0").stderr

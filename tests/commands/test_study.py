@@ -4,15 +4,11 @@ import shutil
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
-import numpy as np
-import pandas as pd
 import pytest
 from builders import raising
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
-from nmpcrl.bench.paired import Ratio
-from nmpcrl.claims import publish, published, rule
-from nmpcrl.claims.verdict import Verdict
+from nmpcrl.claims import publish, published
 from nmpcrl.study import design, store, sweep
 
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
@@ -70,17 +66,6 @@ def test_study_says_what_is_missing_trains_a_part_and_then_the_rest(command, sma
     assert "6 of 6 runs are stored" in done(command, "study", "--dry-run")
 
 
-def test_the_table_of_episodes_tells_every_run_from_every_other(command, published_here, tmp_path):
-    done(command, "study", "--table", str(tmp_path / "episodes.csv.gz"))
-    frame = pd.read_csv(tmp_path / "episodes.csv.gz")
-    assert len(frame) == len(STUDY) * SHORT["episodes"]
-    assert not frame.duplicated([*CELL, "episode"]).any()
-    runs = frame.set_index(CELL)
-    for e, one in published_here.items():
-        mine = runs.loc[(STUDY[e], e.learner, e.layout, e.decay, e.seed)]
-        np.testing.assert_allclose(mine.cost, one.episodes["cost"], rtol=1e-6)
-
-
 def test_verify_compares_with_the_published_runs_and_names_what_contradicts(
     command, published_here
 ):
@@ -111,15 +96,3 @@ def test_verify_trains_as_many_runs_as_are_asked_for_besides_the_stored_ones(
     assert "sample = 7 must be a whole number from 0 to 6" in done(
         command, "verify", "--sample", "7", code=1
     )
-
-
-@pytest.mark.parametrize(("outcome", "code"), [(rule.PARTLY, 0), (rule.UNDECIDABLE, 1)])
-def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
-    command, monkeypatch, outcome, code
-):
-    ratio = Ratio(0.65, 0.62, 0.68, 0.1)
-    judged = Verdict("C3", "half the time", outcome, numbers={"ipopt": ratio})
-    monkeypatch.setattr(publish, "publish_timing", lambda: (judged,))
-    said = done(command, "bench", "--publish", code=code)
-    assert "0.65 [0.62, 0.68] with ipopt" in said
-    assert ("nothing is published" in said) == bool(code)

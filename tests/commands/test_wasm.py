@@ -3,7 +3,6 @@
 import json
 
 import pytest
-from builders import raising
 
 from nmpcrl.control.browser import packed
 from nmpcrl.learning import browser
@@ -47,13 +46,3 @@ def test_what_is_named_is_compiled(command, monkeypatch, tmp_path, line, sizes):
     described = json.loads((tmp_path / "nmpc.json").read_text())
     assert (described["states"], described["inputs"]) == sizes[:2]
     assert described["numbers"] == packed(described).tolist()
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [("--plant mine_for_wasm:plant", "the task has 3 states, the plant 2"), ("", "not here")],
-)
-def test_what_cannot_be_compiled_leaves_no_file(command, monkeypatch, tmp_path, line, said):
-    monkeypatch.setattr(browser, "module", raising(RuntimeError("not here")))
-    assert said in command("wasm", *line.split()).stderr
-    assert not (tmp_path / "nmpc.wasm").exists()

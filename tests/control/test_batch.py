@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_problems import limited, pendulum, tank
 
-from nmpcrl.control import Ipopt, Nmpc, SolverError
+from nmpcrl.control import Nmpc, SolverError
 
 COUNT = 8
 PARTS = ("value", "features", "point", "iterations", "violation", "restarts", "status", "action")
@@ -59,20 +59,6 @@ def test_a_batch_holds_what_solve_finds(controller):
     same(moved, alone(later, 1.01 * thetas, fixed_one_by_one))
     assert np.array_equal(moved[2].states, moved.states[2])
     assert (free.value <= fixed.value + 1e-6 * np.abs(free.value)).all()
-
-
-def test_a_batch_agrees_with_ipopt(nmpc):
-    states, thetas, _, data = drawn(nmpc, 20, seed=3)
-    batch, other = (
-        nmpc.solve_many(states, thetas, data=data),
-        Nmpc(nmpc.problem, solver=Ipopt(1e-10)),
-    )
-    found = other.solve_many(states, thetas, batch, data=data)  # the same minimum
-    assert batch.solved.all()
-    assert found.solved.all()
-    np.testing.assert_allclose(batch.value, found.value, rtol=1e-6)
-    np.testing.assert_allclose(batch.inputs, found.inputs, atol=1e-4)
-    np.testing.assert_allclose(batch.features, found.features, rtol=1e-4, atol=1e-4)
 
 
 def test_what_cannot_be_solved_is_marked_and_leaves_the_others_alone():

@@ -89,8 +89,6 @@ ABSURD = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf, r"(e\+07|10000000)": 1e
           for i, number in ((0, 0.61), (0, -0.61), (1, 1.58), (1, -1.58))),
         ({"state": START[:2]}, r"state has shape \(2,\); it must be \(3,\)"),
         ({"theta": THETA[:8]}, r"theta has shape \(8,\); it must be \(9,\)"),
-        ({"theta": 1.0}, r"theta has shape \(\); it must be \(9,\)"),
-        ({"action": np.zeros(3)}, r"action has shape \(3,\); it must be \(2,\)"),
         ({"state": ["x", "y", "z"]}, r"state = \['x', 'y', 'z'\] must hold 3 numbers"),
         ({"theta": [[1.0], [1.0, 2.0]]}, "theta = .* must hold 9 numbers"),
         ({"data": {"wind": 1.0}}, r"data has no 'wind' \(it has target, discs\)"),

@@ -7,7 +7,7 @@ import pytest
 from small_problems import pendulum
 
 from nmpcrl.control import Nmpc, Policy
-from nmpcrl.learning import as_gymnasium, evaluate
+from nmpcrl.learning import evaluate
 
 STATE, STEPS = np.array([0.6, -0.4]), 6
 
@@ -34,18 +34,6 @@ def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before(nmpc, the
         policy.reset()
         loop = evaluate(nmpc, theta, STEPS, plant=moved(nmpc), start=STATE)
         assert [policy(state).tolist() for state in loop.states] == loop.actions.tolist()
-
-
-def test_stable_baselines_evaluates_a_policy_to_the_cost_of_a_rollout(nmpc, theta):
-    pytest.importorskip("stable_baselines3")
-    from stable_baselines3.common.evaluation import evaluate_policy
-    from stable_baselines3.common.monitor import Monitor
-
-    env = Monitor(as_gymnasium(nmpc, plant=moved(nmpc), start=STATE, steps=STEPS))
-    reward, spread = evaluate_policy(Policy(nmpc, theta), env, n_eval_episodes=2)
-    loop = evaluate(nmpc, theta, STEPS, plant=moved(nmpc), start=STATE)
-    assert reward == pytest.approx(-loop.cost)
-    assert spread == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.parametrize(

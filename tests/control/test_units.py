@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_problems import tank
 
-from nmpcrl.control import Fatrop, Ipopt, Nmpc, Problem, Riccati, Soft, SolverError
+from nmpcrl.control import Fatrop, Ipopt, Nmpc, Problem, Riccati, Soft
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 
@@ -75,13 +75,6 @@ def test_sizes_may_be_said_and_are_found_where_they_are_extreme():
     for wrong in ([1.0, 2.0, 3.0], 0.0, [1.0, np.inf], -1):
         with pytest.raises(ValueError, match=r"scale = .* must hold 2 positive numbers, one a st"):
             tank(1.0, scale=wrong)
-
-
-def test_an_error_names_the_state_in_its_own_units():
-    stage = {"stage": lambda x, u, th: th["k"] * ca.log(x[0] - 1e9) + 1e-10 * u**2}
-    nmpc = Nmpc(tank(1e5, **stage), solver="ipopt")
-    with pytest.raises(SolverError, match=r"in state \[ 50000. 100000.\]"):
-        nmpc.solve(STATE * 1e5, nmpc.problem.theta)
 
 
 @each

@@ -43,12 +43,6 @@ def test_a_wrong_number_is_met_with_a_sentence_that_helps(answer, said):
         number(answer, 1.5, mistakes={3.0: "Twice as much."})
 
 
-def test_zero_is_expected_within_an_absolute_tolerance():
-    assert number(0.001, 0.0).said == "Right: 0."
-    with pytest.raises(Unsolved):
-        number(0.1, 0.0)
-
-
 def test_a_right_number_tells_the_page_what_it_needs():
     outcome = number(1.5, 1.5, unit="m", tolerance=0.01, mistakes={3.0: "Twice as much."})
     assert outcome._repr_mimebundle_()[MIME] == {
@@ -61,15 +55,11 @@ def test_a_right_number_tells_the_page_what_it_needs():
     }
 
 
-@pytest.mark.parametrize("letter", ["b", "B", " b "])
-def test_the_right_letter_is_right(letter):
-    assert choice(letter, "b", WHY).said == "Right: b it is."
-
-
 @pytest.mark.parametrize(
     ("letter", "said"),
     [("a", "No: a."), ("d", "none of a, b and c"), (None, "none of a, b and c")],
 )
-def test_a_wrong_letter_is_met_with_why_it_is_wrong(letter, said):
+def test_a_letter_is_right_or_met_with_why_it_is_wrong(letter, said):
+    assert choice(" B ", "b", WHY).said == "Right: b it is."
     with pytest.raises(Unsolved, match=said):
         choice(letter, "b", WHY)

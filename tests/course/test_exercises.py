@@ -6,7 +6,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from nmpcrl.course.exercises import clear_solutions, exercises
+from nmpcrl.course.exercises import exercises
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 NOTEBOOKS = {path.stem: nbformat.read(path, 4) for path in sorted(BOOK.glob("*.ipynb"))}
@@ -48,13 +48,6 @@ def test_a_group_goes_from_its_text_to_the_next_cell_of_another_kind():
     }  # fmt: skip
     assert [cell.source for cell in two.parts["solution"]] == ["As."]
     assert one.solution == "x = 2"
-
-
-def test_without_its_solution_an_answer_is_what_stood_before_it():
-    cleared = notebook()
-    clear_solutions(cleared)
-    assert cleared.cells[2].source == "x = ...  # a number"
-    assert cleared.cells[3].source == "check.one(x)"
 
 
 @pytest.mark.parametrize("name", EXERCISED)

@@ -104,18 +104,6 @@ def test_nonsense_is_refused(message, refused):
         refused()
 
 
-def test_torchs_generator_and_default_type_neither_decide_the_weights_nor_change():
-    expected = network().weights
-    torch.manual_seed(2)
-    torch.set_default_dtype(torch.float64)
-    try:
-        before = torch.random.get_rng_state()
-        np.testing.assert_array_equal(network().weights, expected)
-        assert torch.equal(torch.random.get_rng_state(), before)
-    finally:
-        torch.set_default_dtype(torch.float32)
-
-
 def test_seeds_decide_every_bit_and_a_memory_that_is_not_full_none():
     options = {"seed": 5}, {"seed": 5}, {"seed": 5, "memory": 200}, {"seed": 6}
     learners = [taught(rows(200), **one) for one in options]

@@ -11,9 +11,7 @@ from nmpcrl.learning import UpdateRule, Weights, expected_sarsa, frozen, q_learn
 from nmpcrl.learning.learners import Auxiliary, first_w
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, Exploration, train
-from nmpcrl.study import Experiment, paper
-from nmpcrl.study.learners import DECAYS
-from nmpcrl.study.setup import prepare
+from nmpcrl.study import paper
 
 
 class Faulty(Nmpc):
@@ -117,16 +115,6 @@ def test_a_solve_in_the_state_itself_is_the_next_warm_start_and_else_the_plan_be
     controller.warm_starts.clear()
     plans = [step.solution for step in run(frozen(controller), controller, noise(2, 3))]
     assert controller.warm_starts == [None, *plans[:2], None, *plans[3:5]]
-
-
-@pytest.mark.parametrize("decay", DECAYS)
-def test_noise_is_standard_normal_and_shrinks_by_the_rate_each_count(robot, decay):
-    experiment = Experiment(decay=decay, episodes=200, steps=130, decay_rate=0.999)
-    explore, (e, t) = prepare(experiment, robot)[2], np.indices((200, 130))
-    np.testing.assert_allclose(explore.scale, 0.999 ** {"step": 130 * e + t, "episode": e}[decay])
-    assert explore.noise.shape == (200, 130, 2)
-    assert explore.noise.mean() == pytest.approx(0, abs=0.02)
-    assert explore.noise.std() == pytest.approx(1, abs=0.02)
 
 
 @pytest.mark.parametrize("failing", [2, 3])  # the plan at t = 1, or the second solve after it

@@ -34,11 +34,9 @@ def refusal(**declared) -> str:
     [
         ("episodes", "300", "episodes = '300' must be a whole number from 1 to 100000"),
         ("layout", [[3, 4], [-2.5, 0.5]], "away from the robot's start, (-2.5, 1.5), and target"),
-        ("layouts", ["A", [[3, 4]]], "layout = [[3, 4]] must be one of A, B, C, D, E, F"),
         ("layout", [[3, 4], [3, 9.5]], "layout = [[3, 4], [3, 9.5]] must, in a chapter, have"),
         ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
         ("alpha", 1e3, "alpha = 1000 must be at most 1e-05 in a chapter"),
-        ("beta", 1.0, "beta = 1 must be at most 0.0001 in a chapter"),
     ],
 )
 def test_a_value_that_is_not_allowed_is_refused(name, given, said):
@@ -49,7 +47,6 @@ def test_a_value_that_is_not_allowed_is_refused(name, given, said):
     ("cell", "declared", "said"),
     [
         ("episode = 2", PARAMETERS, "'episode' (did you mean 'episodes'?); it has " + NAMES),
-        ('open = "x"\nepisodes = 2', PARAMETERS, "'open'; it has " + NAMES),
         ("episodes = 2", {}, "'episodes'; it has none"),
     ],
 )
@@ -63,7 +60,6 @@ def test_a_name_that_papermill_set_and_the_chapter_lacks_is_refused(session, cel
     [
         ("episodes = 300", "# Parameters\nepisodes = 2\nseeds = [3]\n"),
         (),
-        ("# Parameters\n",),
         ('# Parameters\nPAPERMILL_INPUT_PATH = "in.ipynb"\n',),
         ("# Parameters\nepisode = 2\n", "# Parameters\nepisodes = 2\n"),  # it was corrected
         ("episode = 2", "# Parameter\nfigure = 2\n", "%matplotlib inline", "further = [1, 2]"),

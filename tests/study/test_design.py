@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from nmpcrl.study import Experiment, ParameterError, design, run, sweep
+from nmpcrl.study import Experiment, ParameterError, design, sweep
 from nmpcrl.study.experiment import MAIN, PAPER, frozen_arm
 from nmpcrl.study.learners import DECAYS
 
@@ -67,13 +67,6 @@ def test_a_replica_differs_in_the_twelfth_digit_of_theta_x():
         assert [(e.solver, e.episodes) for e in pair] == [
             ("riccati", expected), ("ipopt", expected),
         ]  # fmt: skip
-
-
-@pytest.mark.slow
-def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
-    """Until rounding separates them; two episodes of a learner that settles are far from it."""
-    one, other = (run(e).steps["theta"] for e in design.solver_pair(Experiment(episodes=2)))
-    np.testing.assert_allclose(one, other, atol=1e-6)
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from importlib import import_module
 from itertools import count, product
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,10 +16,9 @@ from nmpcrl.study.design import FIELDS
 from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.parameters import shown
 from nmpcrl.study.provenance import key
-from nmpcrl.study.records import Records, StepStatus
+from nmpcrl.study.records import StepStatus
 
 RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
-DRAWN = ((0.5, 2.2), (3.0, 0.5))
 SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are ready after 128 steps
 
 
@@ -82,16 +80,6 @@ def test_the_centres_of_a_named_layout_are_that_layout():
         assert (drawn.layout, key(drawn)) == (name, key(Experiment(layout=name)))
     backwards = Experiment(layout=paper.LAYOUTS["A"][::-1])
     assert key(backwards) != key(Experiment())  # sums are made in their order
-
-
-def test_a_run_among_drawn_obstacles_begins_and_ends_where_it_is_to(tmp_path):
-    fields = {"layout": DRAWN, "start": (0, 0, 0), "target": (2, 4, 1.5)}
-    records = run(Experiment(learner="frozen", episodes=1, **fields))
-    np.testing.assert_array_equal(records.evaluations["states"][0, 0], (0, 0, 0))
-    assert Experiment(**fields).task.distance(records.evaluations["states"][-1, -1]) < 0.5
-    records.save(tmp_path / "run.npz")
-    again = Records.load(tmp_path / "run.npz")
-    assert Experiment(**again.experiment) == Experiment("frozen", episodes=1, **fields)
 
 
 @pytest.fixture(scope="module")
@@ -157,20 +145,6 @@ def test_evaluations_come_first_every_so_often_and_last_and_each_episode_is_repo
     assert records.evaluations["states"].shape == (4, 6, 3)
     sums = np.bincount(records.steps["episode"], records.steps["cost"])
     np.testing.assert_allclose(reported, np.column_stack([range(1, 6), sums]), rtol=1e-12)
-
-
-def test_evaluations_do_not_count_as_training_time(monkeypatch):
-    now, evaluate = [0.0], RUN.evaluate
-
-    def slowly(*arguments, **options):
-        now[0] += 1000.0
-        return evaluate(*arguments, **options)
-
-    monkeypatch.setattr(RUN, "evaluate", slowly)
-    monkeypatch.setattr(RUN, "time", SimpleNamespace(perf_counter=lambda: now[0]))
-    records = run(Experiment(learner="ES", episodes=3, steps=2, evaluate_every=1))
-    assert now == [4000.0]
-    assert records.facts["seconds"] == records.steps["seconds"].max() == 0
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """The time that experiments take, and its limit."""
 
-from dataclasses import replace
-
 import pytest
 
 from nmpcrl.claims import published
@@ -16,21 +14,6 @@ def test_the_estimate_of_the_published_study_is_near_what_it_took():
         pytest.skip("every published run is of earlier epochs")
     hours = sum(row["seconds"] for row in rows.values()) / 3600
     assert sum(map(seconds_of, rows)) / 3600 == pytest.approx(hours, rel=0.2)
-
-
-@pytest.mark.parametrize(
-    ("learner", "longer"),
-    [
-        ("ES", {"episodes": 600, "steps": 260, "horizon": 20, "solver": "ipopt"}),
-        ("GES", {"evaluate_every": 1, "constrained": True}),
-        ("RDES", {"network": "four fits"}),
-    ],
-)
-def test_longer_runs_take_longer(learner, longer):
-    for name, value in longer.items():
-        one = Experiment(learner)
-        assert seconds_of(replace(one, **{name: value})) > seconds_of(one)
-    assert seconds_of(Experiment("RDES")) > seconds_of(Experiment("ES"))
 
 
 def refusal(runs, **options) -> str:

@@ -88,13 +88,6 @@ def test_the_clock_begins_anew_and_a_plan_sees_its_own_stages():
     assert not np.array_equal(world.data(3)["centres"][1:], moving.frozen(MOVING, 3)[1:])
 
 
-def test_what_the_controller_believes_changes_the_plan_and_not_the_charge():
-    far = still([(99.0, 99.0)] * 4)
-    blind = evaluate(NMPC, THETA, 60, **World(MOVING, seen=far).environment)
-    assert inside(blind.states, MOVING).any()
-    assert blind.cost > evaluate(NMPC, THETA, 60, **World(far).environment).cost
-
-
 def test_a_state_is_inside_where_the_overlap_of_its_own_step_is_positive():
     motions = [Straight((0.0, 0.0), (1.0, 0.0))]  # 0.2 m a step
     states = np.array([[0.0, 1.2, 0.0], [1.46, 0.0, 0.0], [0.4, 1.26, 0.0]])

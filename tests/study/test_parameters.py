@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -109,11 +108,6 @@ NUMBERS = {"1e-7": "1.0e-7", "-2E5": "-2.0e+5", ".5e3": "5.0e+2", "1.25e5": "1.2
 )
 def test_a_refusal_of_a_text_or_a_list_says_what_to_write(kind, given, said):
     assert refusal(kind, given) == said
-
-
-def test_yaml_reads_what_is_to_be_written_as_the_number():
-    for text, written in NUMBERS.items():
-        assert (type(yaml.safe_load(text)), yaml.safe_load(written)) == (str, float(text))
 
 
 def test_a_value_is_shown_on_one_short_line_and_a_notebook_shows_no_traceback():

@@ -20,22 +20,6 @@ def test_a_key_depends_on_the_fields_that_differ_from_their_original_values():
     assert key(Experiment()) != summary_key(Experiment())
 
 
-@pytest.mark.parametrize(
-    ("one", "begins"),
-    [
-        (Experiment(), "9e79cb1f74"),
-        (Experiment("RDES", layout="B", seed=7, decay="episode", gated=False), "da885a4823"),
-        (Experiment("GES", layout="0.5,2.2 3,0.5", beta=2e-8, box="soft"), "3f1e689524"),
-        (Experiment("TDC", beta_tdc=1e-7, horizon=20, solver="fatrop"), "1a87ffe9e9"),
-    ],
-)
-def test_stored_runs_keep_their_keys(monkeypatch, one, begins):
-    """The keys in the first epoch, with libraries that are all of version 1."""
-    monkeypatch.setattr(provenance, "installed", lambda _: "1")
-    monkeypatch.setattr(provenance, "EPOCHS", dict.fromkeys(provenance.EPOCHS, 1))
-    assert key(one)[:10] == begins
-
-
 def test_the_centres_of_a_layout_count_and_not_its_letter(monkeypatch):
     before = key(Experiment(layout="A")), key(Experiment(layout="B"))
     monkeypatch.setitem(paper.LAYOUTS, "Z", paper.LAYOUTS["B"])

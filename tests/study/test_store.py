@@ -5,7 +5,6 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from nmpcrl.control.variant import Variant
 from nmpcrl.study import (
     Experiment,
     Records,
-    Runs,
     StoreError,
     fetch,
     fetch_all,
@@ -27,7 +25,6 @@ from nmpcrl.study import (
     run,
     store,
     stored,
-    sweep,
 )
 from nmpcrl.study.store import RUNS
 
@@ -143,25 +140,6 @@ def test_a_run_says_if_any_of_its_problems_needed_another_solver(monkeypatch):
     assert run(QUICK).facts["solver"] == "riccati"
 
 
-def test_other_files_are_not_listed(runs, capsys):
-    assert stored() == {}
-    fetch(QUICK)
-    (runs / "other.npz").write_bytes(b"not a run")
-    (runs / "notes.txt").write_text("not even that")
-    assert [*stored()] == [RUNS.path_of(QUICK)]
-    assert capsys.readouterr().err.endswith("other.npz is damaged, or not a run; it is ignored\n")
-
-
-@pytest.mark.slow
-def test_runs_train_in_processes_and_come_out_as_in_this_one():
-    experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
-    found = fetch_all(experiments, workers=2, progress=False)
-    assert [*found] == [*experiments]
-    for experiment in experiments:
-        assert_same_numbers(found[experiment], run(experiment))
-        assert_same_numbers(Records.load(RUNS.path_of(experiment)), found[experiment])
-
-
 @both_ways
 def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_trained(
     monkeypatch, no_run, ask
@@ -171,34 +149,6 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_trained(
     monkeypatch.setattr(files.tempfile, "TemporaryFile", raising(error))
     with pytest.raises(StoreError, match=r"cannot be written \(Read-only .* set NMPCRL_RUNS"):
         ask(QUICK)
-
-
-@both_ways
-def test_a_disk_that_is_full_when_a_run_ends_is_one_sentence(runs, monkeypatch, ask):
-    fetch(LEARNING)
-
-    def full(file, **_):
-        file.write(b"half")
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(np, "savez_compressed", full)
-    with pytest.raises(StoreError, match=r"npz cannot be written \(No space left on device\)"):
-        ask(QUICK)
-    assert [*runs.glob("*.npz")] == [RUNS.path_of(LEARNING)]
-    assert [*runs.glob(".*.tmp")] == []
-
-
-@both_ways
-def test_a_run_that_may_not_be_read_is_not_taken_for_a_damaged_one(monkeypatch, no_run, ask):
-    fetch(QUICK)
-    content = RUNS.path_of(QUICK).read_bytes()
-    no_run()
-    denied = PermissionError(errno.EACCES, "Permission denied", str(RUNS.path_of(QUICK)))
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "open", raising(denied))
-        with pytest.raises(PermissionError):
-            ask(QUICK)
-    assert RUNS.path_of(QUICK).read_bytes() == content
 
 
 @both_ways
@@ -223,13 +173,3 @@ def test_a_run_that_another_is_training_is_awaited_and_not_trained_twice(monkeyp
         go_on.set()
         assert_same_numbers(first.result(), second.result())
     assert trained == [QUICK]
-
-
-def test_runs_are_read_by_experiment_and_selected_by_field():
-    experiments = sweep(learner=("ES", "frozen"), seed=(5, 6), episodes=1)
-    study = Runs(dict(zip(experiments, "abcd", strict=True)))
-    assert study[experiments[2]] == "c"
-    assert list(study.select(seed=6).values()) == ["b", "d"]
-    assert list(study.select(seed=6, learner="ES")) == [experiments[1]]
-    assert len(study.select(seed=7)) == 0
-    assert study.values_of("learner") == ("ES", "frozen")

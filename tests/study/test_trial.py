@@ -121,7 +121,6 @@ def test_trials_of_a_notebook_are_done_in_other_processes(runs):
     [
         ({"episodes": 0}, "episodes = 0 must be a whole number from 1"),
         ({"make": frozen(TANK)}, "must be a function of nmpc"),
-        ({"nmpc": None}, "nmpc = None must be an Nmpc"),
         ({"nmpc": paper.nmpc()}, "theta must be given where the Nmpc has a task and no Problem"),
         ({"plant": np.random.default_rng(0)}, "this trial cannot be stored: a Generator, .*"),
     ],

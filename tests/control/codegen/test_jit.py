@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import raising
 
 from nmpcrl.control.codegen import folder, jit
 from nmpcrl.control.codegen.source import CannotCompile
@@ -137,17 +136,6 @@ def test_what_cannot_be_imported_leaves_nothing(cache, capsys, text, error, word
     assert not [name for name in sys.modules if name.startswith("stopped_")]
 
 
-def test_a_process_with_too_little_memory_removes_nothing(cache, monkeypatch):
-    texts = {"__init__": "answer = 42\n"}
-    del sys.modules[jit.load("complete", texts).__name__]
-    with monkeypatch.context() as patch:
-        patch.setattr(folder, "import_package", raising(MemoryError()))
-        with pytest.raises(MemoryError):
-            jit.load("complete", texts)
-    assert [*cache.rglob(jit.COMPLETE)]
-    assert jit.load("complete", texts).answer == 42
-
-
 # Each makes a cache unfit, and returns the reason that is given.
 
 
@@ -155,12 +143,6 @@ def below_a_file(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     cache.touch()
     monkeypatch.setenv("NMPCRL_CACHE", str(cache / "below"))
     return f"{cache / 'below'}: Not a directory"
-
-
-def read_only(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    may = os.access
-    monkeypatch.setattr(os, "access", lambda place, how: place != cache and may(place, how))
-    return f"{cache} cannot be written"
 
 
 def of_another_user(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -190,9 +172,7 @@ def full(cache: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> str:
 
 UNFIT: dict[str, Callable[[Path, pytest.MonkeyPatch], str]] = {
     "below a file": below_a_file,
-    "read-only": read_only,
     "of another user": of_another_user,
-    "open to a group": lambda cache, _: open_to(cache, 0o770),
     "open to all": lambda cache, _: open_to(cache, 0o707),
     "full": lambda *given: full(*given, "write"),
     "filled by numba": lambda *given: full(*given, "import_package"),

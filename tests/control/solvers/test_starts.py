@@ -14,7 +14,7 @@ from nmpcrl.control import (
     differential_drive,
 )
 from nmpcrl.control.solvers import SOLVERS
-from nmpcrl.control.solvers.starts import MOST, cold_inputs
+from nmpcrl.control.solvers.starts import MOST
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -83,10 +83,3 @@ def test_a_problem_with_rows_has_several_starts_of_itself():
     assert one.states[-1] == pytest.approx(0.96, abs=0.02)
     assert several.states[-1] == pytest.approx(-1.04, abs=0.02)
     assert several.value < one.value
-
-
-def test_all_starts_that_can_be_asked_for_lie_within_the_bounds_and_differ():
-    robot = differential_drive()
-    found = cold_inputs(robot, 10, MOST - 1)
-    assert len({u.tobytes() for u in found}) == MOST - 1
-    assert all(((robot.lower <= u) & (u <= robot.upper)).all() for u in found)
