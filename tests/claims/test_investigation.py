@@ -137,6 +137,14 @@ def test_a_table_is_registered_by_the_commit_before_its_first_row():
     assert published.about("early")["registered"] == "abc"
 
 
+@pytest.mark.parametrize(
+    ("answer", "said"), [(lambda _: True, "gives True and no"), (lambda _: 1 / 0, "division by")]
+)
+def test_a_question_that_fails_is_named(answer, said):
+    with pytest.raises(Refusal, match=f"the question 'odd' .*{said}"):
+        toy(questions=(Question("odd", "?", NOT, answer),)).answers(pd.DataFrame())
+
+
 def with_paths(setting, place, episodes, seed):
     row = run(setting, place, episodes, seed) | {"seconds": 7.0}
     return row if place == "a" else row | {"path": [[seed, 1], [2, -3]]}

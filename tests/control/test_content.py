@@ -1,9 +1,11 @@
 """What a value is made of: the same for what does the same, and different for what does not."""
 
+import pickle
 import sys
 from dataclasses import dataclass
 from functools import partial
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -75,6 +77,12 @@ def test_names_and_comments_change_nothing_and_a_function_may_call_itself():
     assert content(one) == content(other)
     text = "def f(n):\n    return n and f(n - 1)"
     assert content(functions(text)["f"]) == content(functions(text)["f"])
+
+
+def test_an_environment_of_gymnasium_is_its_specification():
+    one, other = (gymnasium.make("Pendulum-v1", g=g) for g in (9.81, 3.7))
+    assert content(one) == content(gymnasium.make("Pendulum-v1", g=9.81)) != content(other)
+    assert content(pickle.loads(pickle.dumps(one))) == content(one)
 
 
 @pytest.mark.parametrize("value", [np.random.default_rng(0), closing(np.random.default_rng(0))])

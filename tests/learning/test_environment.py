@@ -85,6 +85,7 @@ TWO_STATES = FILLING | {"plant": lambda s, a, rng: ([1, 2], 0, False)}
         ("tank", TWO_STATES, "a state is 1 finite numbers"),
         ("tank", FILLING | {"start": [np.nan]}, NO_STATE),
         ("tank", FILLING | {"start": [1.0, 2.0]}, NO_STATE),
+        ("tank", FILLING | {"start": "here"}, NO_STATE),
         ("tank", SELLING | {"data": {"price": 1.0}}, "data 'price' must be an array with an axis"),
         ("robot", {"plant": THREE}, "the plant has 3 states and 1 inputs, and the plan 3"),
         ("robot", {"plant": SLOW}, NARROW),

@@ -77,6 +77,7 @@ def test_the_seeds_of_an_environment_come_from_the_generator(car):
         (lambda: gymnasium.make("Pendulum-v1"), {}, "observation_space = .* must be a Box of 2 nu"),
         (lambda: gymnasium.make("MountainCar-v0"), {}, r"= Discrete\(3\) must be a Box"),
         (lambda: Slow(0.5), {}, r"between \[-0.5\] and \[0.5\], .* \[-1.\] and"),
+        (lambda: Slow(9, int), {}, "action_space = .*int.* must hold floats"),
         (Slow, {"start": [0.0, 0.0]}, "draws its own start: leave start= out"),
     ],
 )

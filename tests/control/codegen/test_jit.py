@@ -145,6 +145,12 @@ def below_a_file(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return f"{cache / 'below'}: Not a directory"
 
 
+def read_only(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    may = os.access
+    monkeypatch.setattr(os, "access", lambda place, how: place != cache and may(place, how))
+    return f"{cache} cannot be written"
+
+
 def of_another_user(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     users, user = iter([-1]), os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: next(users, user))
@@ -172,6 +178,7 @@ def full(cache: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> str:
 
 UNFIT: dict[str, Callable[[Path, pytest.MonkeyPatch], str]] = {
     "below a file": below_a_file,
+    "read-only": read_only,
     "of another user": of_another_user,
     "open to all": lambda cache, _: open_to(cache, 0o707),
     "full": lambda *given: full(*given, "write"),
