@@ -1,10 +1,12 @@
 """What a `Problem` gives by name: theta, its gradient, and data of one stage or of all."""
 
+import gc
 import math
+import weakref
 
 import numpy as np
 import pytest
-from small_problems import pendulum
+from small_problems import open_field, pendulum, point_mass
 
 from nmpcrl.control import Nmpc
 
@@ -45,3 +47,16 @@ def test_data_are_given_once_or_stage_by_stage():
     allowed = r"data 'target' has shape \(3,\); it must be \(2,\) or \(7, 2\)"
     with pytest.raises(ValueError, match=allowed):
         value(target=np.zeros(3))
+
+
+@pytest.mark.parametrize("solver", ["riccati", "fatrop"])
+@pytest.mark.parametrize("make", [lambda: (pendulum(),), lambda: (point_mass(), open_field())])
+def test_a_problem_a_plant_and_a_task_end_with_their_last_user(make, solver):
+    given = make()
+    nmpc = Nmpc(*given, solver=solver)
+    theta = nmpc.problem.theta
+    nmpc.value_hessian_times(nmpc.solve(np.full(nmpc.n, 0.3), theta), theta)
+    alive = [weakref.ref(one) for one in (*given, nmpc, nmpc.problem)]
+    del given, nmpc
+    gc.collect()
+    assert [one() for one in alive] == [None] * len(alive)

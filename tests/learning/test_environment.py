@@ -14,6 +14,7 @@ from nmpcrl.learning import (
     Diverged,
     evaluate,
     expected_sarsa,
+    frozen,
     q_learning,
 )
 
@@ -150,3 +151,36 @@ def test_the_next_state_is_valued_with_the_data_of_the_next_time(tank, constrain
             seen = step.update.successor.solution.data
             np.testing.assert_array_equal(seen[:, 0], later.plan.data[:, 0])
         assert step.solution.data[0, 0] == PRICES[step.time]
+
+
+def test_a_plant_that_writes_into_its_arguments_changes_no_state_action_or_start(tank):
+    def in_place(state, action, rng):
+        np.clip(action, -0.1, 0.1, out=action)  # as an actuator does
+        state += 0.5 * action
+        return state, float(state[0] ** 2), False
+
+    def careful(state, action, rng):
+        return in_place(state.copy(), action.copy(), rng)
+
+    found = []
+    for plant in (in_place, careful):
+        start = np.array([0.3])
+        steps = run(q_learning(tank, 1e-3), tank, noise(2, 4, 1), plant=plant, start=start)
+        moved = [(*step.state, *step.action, *step.weights.theta) for step in steps]
+        rollout = evaluate(tank, tank.problem.theta, 4, plant=plant, start=start)
+        found.append((moved, rollout.states.tolist(), rollout.actions.tolist(), start.tolist()))
+    assert found[0] == found[1]
+    assert start == [0.3]
+
+
+def test_a_plant_draws_neither_the_noise_of_the_same_int_nor_what_rollouts_draw(tank):
+    drawn = []
+
+    def plant(state, action, rng):
+        drawn.append(rng.normal())
+        return state, 0.0, False
+
+    explore = noise(1, 30, 1)  # by `default_rng(0)`
+    run(frozen(tank), tank, explore, plant=plant, start=[0.2], rng=0)
+    evaluate(tank, tank.problem.theta, 30, plant=plant, start=[0.2], rng=0)
+    assert len({*drawn, *explore.noise.ravel()}) == len(drawn) + 30
