@@ -1,4 +1,4 @@
-"""Claims that runs decide: each run, or pair of runs, has a number, and yes ends at a border.
+"""Claims that runs decide: a threshold divides the numbers of runs, or pairs, into yes and no.
 
 Three classes ask three questions of the numbers. The answer is missing where the number is nan.
 """
@@ -130,7 +130,7 @@ class Contrast(RunClaim):
 def halves(
     learners: tuple[str, str], values: Values, borders: Mapping[str, float]
 ) -> tuple[Halves, ...]:
-    """Both halves of a contrast in each reading of the decay.
+    """Both halves of a contrast for each decay of the noise.
 
     `borders` have, by the way to go wrong, the number above which a run does; the claim's own
     first.

@@ -66,7 +66,7 @@ def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
 
 
 def costs_less_anew(runs: pd.DataFrame, first: str, second: str) -> Estimate:
-    """As `costs_less`, with the interval for layouts drawn anew (see `rule.drawn_anew`)."""
+    """As `costs_less`, with the interval for other layouts (see `rule.drawn_anew`)."""
     layouts = (of for _, of in runs[runs.learner.isin((first, second))].groupby("layout"))
     return drawn_anew(costs_less(one, first, second).value for one in layouts)
 

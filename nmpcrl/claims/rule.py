@@ -40,7 +40,7 @@ from nmpcrl.study.records import Column, Stopped
 MAJORITY = 0.5
 NEARLY_ALL = 0.9
 NEARLY_NONE = 0.1
-FEWEST_LAYOUTS = 5  # of an interval for layouts drawn anew
+FEWEST_LAYOUTS = 5  # of an interval for other layouts
 
 CELL = ["layout", "decay", "seed"]  # equal in two runs that are compared
 
@@ -154,7 +154,7 @@ def counted(answers: pd.Series, level: str = "") -> dict[str, Answers]:
 def settle(
     claim: Claim, answers: pd.Series, weaker: pd.Series | None = None, unit: str = "pairs"
 ) -> Verdict:
-    """The verdict on a claim, overall, in each layout and in each reading of the decay.
+    """The verdict on a claim, overall, in each layout and for each decay of the noise.
 
     Answers are True, False or missing, indexed by layout, decay, seed or by other levels; `weaker`
     are those to a weaker question, which a yes to the first implies.
@@ -189,7 +189,7 @@ def settle(
 
 
 def drawn_anew(values: Iterable[float]) -> Estimate:
-    """The mean of one value a layout, with the interval of 95 % for layouts drawn anew.
+    """The mean of one value a layout, with the interval of 95 % for other layouts.
 
     The bootstrap draws layouts. Where all values are 0, or all 1, it would have no width, and the
     interval is Wilson's of as many layouts. Below `FEWEST_LAYOUTS` the bounds are nan.

@@ -88,7 +88,7 @@ class Verdict:
 
     @property
     def own_halves(self) -> tuple[Halves, ...]:
-        """The halves by the claim's own measure, in each reading of the decay."""
+        """The halves by the claim's own measure, for each decay of the noise."""
         return tuple(one for one in self.halves if one.wrong == self.halves[0].wrong)
 
     @property

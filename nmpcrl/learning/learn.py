@@ -100,7 +100,7 @@ def learn(
     no error: the result says so, with what was reached before.
 
     Args:
-        nmpc: plans and acts, and is what is learned.
+        nmpc: the controller whose theta is learned.
         learner: its name, with its `options`, as in learn(nmpc, "QL", alpha=1e-4): LSTD-Q, which
             needs no step size, and here has a `stride` of 0.3, QL, DPG, ES, GES or TDC. Or any
             `Learner`.

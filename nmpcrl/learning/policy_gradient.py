@@ -93,7 +93,7 @@ def policy_gradient(
 ) -> Learner:
     """DPG: theta <- theta - alpha dJ / dtheta, estimated anew from each batch; one solve a step.
 
-    It needs exploration: without it a = pi(s), and nothing is learned. Means stand where other
+    It needs exploration: without it a = pi(s), and nothing is learned. It has means where other
     texts have sums, so that alpha does not depend on the length of an episode.
 
     Source: Gros and Zanon (2020), with the critic by LSTD of Gros and Zanon (2021).

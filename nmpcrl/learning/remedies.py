@@ -1,4 +1,4 @@
-"""What may help where learning fails: other rules, and what is put around any learner.
+"""Rules, and wrappers of any learner, that may help where learning fails.
 
 =========  =======================================================================
 remedy     theta moves by
@@ -108,7 +108,7 @@ def of_each_step(learner: Learner, who: str) -> UpdateRule:
 
 
 class Around:
-    """What is put around a rule, of which its memory holds the `inner` one."""
+    """A wrapper of a rule; its memory contains that of the `inner` rule."""
 
     rule: UpdateRule
 
@@ -238,7 +238,7 @@ def wrapped(learner: Learner, how: str, own: Any) -> Learner:
 
 
 def judged_theta(weights: Weights) -> Vector:
-    """The theta that a learner stands for: the mean, or the best, where its rule has one."""
+    """The theta that a learner returns: the mean, or the best, where its rule has one."""
     memory = weights.memory
     if isinstance(memory, Best):
         return memory.weights.theta

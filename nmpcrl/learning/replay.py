@@ -66,8 +66,8 @@ def replayed(
 ) -> Learner:
     """A learner that follows each step by `draws` steps along transitions of the last `size`.
 
-    They are drawn evenly and solved anew, at the cost of a step each; on the plant nothing is
-    done. Source: Lin (1992).
+    The transitions are random and solved anew, at the cost of a step each; the plant is not
+    used. Source: Lin (1992).
 
     Raises:
         ValueError: it solves nothing in the next state, or moves theta by batches as LSTD-Q does.

@@ -59,7 +59,7 @@ def cited(text: str, value: Any, quantity: str) -> str:
 def by_reading(
     name: str, form: str, values: Iterable[float], decays: Iterable[str], origin: str
 ) -> str:
-    """The median over the runs of each reading of the decay: "0.74 (per step) and 0.44 (...)".
+    """The median over the runs for each decay of the noise: "0.74 (per step) and 0.44 (...)".
 
     Args:
         name: of the number.

@@ -104,7 +104,7 @@ CLAIMS: Mapping[str, RunClaim] = {  # judged in each layout, by their names in `
 
 
 def arms(learners: Iterable[str], decays: Iterable[str] = DECAYS, **fields: Any) -> dict[str, Any]:
-    """Each learner in each reading of the decay: "ES step"."""
+    """Each learner for each decay of the noise: "ES step"."""
     runs = sweep(learner=tuple(learners), decay=tuple(decays), **fields)
     return {f"{one.learner} {one.decay}": one.canonical for one in runs}
 

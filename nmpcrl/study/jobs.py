@@ -68,7 +68,7 @@ def parallel(
     """Call a function with every item; yield each item and its result as soon as it has one.
 
     A failed job stops no other one, and `Failed` is raised at the end. When a process is killed,
-    each job in progress is begun again alone, so that none fails for what another one did. Leaving
+    each job in progress is begun again alone, so that no job fails because of another. Leaving
     the loop early ends all processes.
 
     Args:

@@ -76,7 +76,7 @@ def trap(task: Task, stands: Sequence[Stand], moments: Sequence[int], finding: s
         over_episodes(axes, "episode" if name in PANELS[-1] else "")
     panels["value"].set_ylim(top=1.5 * panels["value"].get_ylim()[1])
     panels["value"].legend(ncols=2, fontsize="small", loc="upper right")
-    panels["value"].set_title("grey: the robot stands", **SUBTITLE)
+    panels["value"].set_title("grey: the robot is stuck", **SUBTITLE)
     return headed(figure, finding)
 
 
