@@ -87,9 +87,12 @@ def test_what_else_a_student_changes_does_not_matter(graded):
         cell.id = f"other-{cell.id}"
     at = own.cells.index(cell_of(own, "chapter"))
     own.cells.insert(at + 1, new_code_cell("def half():\n    return four / 2", id="own"))
-    lost = graded(checks=checks, ids=ids, own=own)
+    magic = solved(
+        one="%matplotlib inline\n!echo hello\nroot_of_one = 2", two="%%time\nroot_of_two = 2"
+    )
+    lost = graded(checks=checks, ids=ids, own=own, magic=magic)
     assert lost["checks"] == ["3 is not right: it is too large.", "", "", ""]
-    assert lost["ids"] == lost["own"] == ["", "", "", ""]
+    assert lost["ids"] == lost["own"] == lost["magic"] == ["", "", "", ""]
 
 
 def test_a_folder_without_notebooks_is_refused(tmp_path, release):
