@@ -153,7 +153,9 @@ def test_the_next_state_is_valued_with_the_data_of_the_next_time(tank, constrain
         assert step.solution.data[0, 0] == PRICES[step.time]
 
 
-def test_a_plant_that_writes_into_its_arguments_changes_no_state_action_or_start(tank):
+def test_a_plant_may_write_into_its_arguments_and_return_one_array_for_ever(tank):
+    mine = np.zeros(1)
+
     def in_place(state, action, rng):
         np.clip(action, -0.1, 0.1, out=action)  # as an actuator does
         state += 0.5 * action
@@ -162,15 +164,19 @@ def test_a_plant_that_writes_into_its_arguments_changes_no_state_action_or_start
     def careful(state, action, rng):
         return in_place(state.copy(), action.copy(), rng)
 
+    def returned(state, action, rng):
+        mine[:], cost, end = careful(state, action, rng)
+        return mine, cost, end
+
     found = []
-    for plant in (in_place, careful):
+    for plant in (in_place, returned, careful):
         start = np.array([0.3])
         steps = run(q_learning(tank, 1e-3), tank, noise(2, 4, 1), plant=plant, start=start)
         moved = [(*step.state, *step.action, *step.weights.theta) for step in steps]
         rollout = evaluate(tank, tank.problem.theta, 4, plant=plant, start=start)
-        found.append((moved, rollout.states.tolist(), rollout.actions.tolist(), start.tolist()))
-    assert found[0] == found[1]
-    assert start == [0.3]
+        found.append((moved, rollout.states.tolist(), rollout.actions.tolist()))
+        assert start == [0.3]
+    assert found[0] == found[1] == found[2]
 
 
 def test_a_plant_draws_neither_the_noise_of_the_same_int_nor_what_rollouts_draw(tank):
