@@ -14,7 +14,7 @@ from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import ENTRIES, Judgement, Robot, entry, gain, judge, judge_all, solved
 from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
 from nmpcrl.study import Experiment, ParameterError, paper, published, run
-from nmpcrl.study.drawn import JUDGE
+from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.robot import NmpcPolicy
 
@@ -212,6 +212,12 @@ def test_an_entry_ends_where_the_published_one_did(base):
     found = judge(entry(known.arm), known.place, suite.seed_of(known.place, known.k), 50)
     assert found.cost == pytest.approx(known.cost, rel=1e-4)
     assert (found.episodes, found.arrived) == (known.episodes, known.arrived)
+
+
+def test_seeds_are_held_out_and_no_two_places_share_one():
+    seeds = [suite.seed_of(name, k) for name in (*suite.LAYOUTS, *SCENARIOS) for k in (0, 9)]
+    assert len({*seeds}) == len(seeds)
+    assert min(seeds) >= suite.HELD_OUT
 
 
 MISSED, POOR = replace(GOOD, arrived=False), replace(GOOD, cost=4000.0)

@@ -7,7 +7,15 @@ import pytest
 from learning.small_runs import THETA, noise, run
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
-from nmpcrl.learning import UpdateRule, Weights, expected_sarsa, frozen, q_learning
+from nmpcrl.learning import (
+    UpdateRule,
+    Weights,
+    count_episodes,
+    count_steps,
+    expected_sarsa,
+    frozen,
+    q_learning,
+)
 from nmpcrl.learning.learners import Auxiliary, first_w
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, Exploration, train
@@ -115,6 +123,15 @@ def test_a_solve_in_the_state_itself_is_the_next_warm_start_and_else_the_plan_be
     controller.warm_starts.clear()
     plans = [step.solution for step in run(frozen(controller), controller, noise(2, 3))]
     assert controller.warm_starts == [None, *plans[:2], None, *plans[3:5]]
+
+
+def test_noise_is_standard_normal_and_shrinks_by_the_rate_each_count():
+    (e, t), shape, rng = np.indices((200, 130)), (200, 130, 2), np.random.default_rng(0)
+    for count, power in ((count_steps, 130 * e + t), (count_episodes, e)):
+        explore = Exploration.draw(rng, shape, decay_rate=0.999, count=count)
+        np.testing.assert_allclose(explore.scale, 0.999**power)
+        assert explore.noise.mean() == pytest.approx(0, abs=0.02)
+        assert explore.noise.std() == pytest.approx(1, abs=0.02)
 
 
 @pytest.mark.parametrize("failing", [2, 3])  # the plan at t = 1, or the second solve after it

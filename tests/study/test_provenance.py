@@ -16,6 +16,7 @@ def test_a_key_depends_on_the_fields_that_differ_from_their_original_values():
     for name, value in {"seed": 1, "alpha": 2e-7, "theta": (0.9,) * 9, "solver": "ipopt"}.items():
         assert identity(Experiment(**{name: value})) == {name: value}
         assert key(Experiment(**{name: value})) != key(Experiment())
+    assert identity(Experiment("RDES", gated=False)) == {"learner": "RDES", "gated": False}
     assert identity(Experiment(layout="B")) == {"obstacles": paper.LAYOUTS["B"]}
     assert key(Experiment()) != summary_key(Experiment())
 
