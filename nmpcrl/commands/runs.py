@@ -64,6 +64,18 @@ def begins(path: Path, name: str) -> bool:
     return fnmatchcase(path.stem, f"{name}*")
 
 
+def costs_of(records: Any) -> str:
+    """The costs without noise of a run, as `train` and `show` print them."""
+    from nmpcrl.analysis import metrics
+    from nmpcrl.study.records import LAST
+
+    before, after = metrics.initial_cost(records), metrics.final_cost(records)
+    return (
+        f"noise-free cost {after:.1f} (mean of the last {LAST} rollouts); theta_init's was"
+        f" {before:.1f}"
+    )
+
+
 def stored_run(name: str) -> Path:
     """The file of a stored run, by its path, its name, or the beginning of no other run's name."""
     from nmpcrl.study.files import folder

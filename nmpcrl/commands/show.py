@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from nmpcrl.commands.options import new_file
-from nmpcrl.commands.runs import stored_run
+from nmpcrl.commands.runs import costs_of, stored_run
 
 
 @click.command()
@@ -30,7 +30,6 @@ def show(run: str, out: Path | None) -> None:
     if kind not in ("svg", "png"):
         raise click.BadParameter(f"{str(out)!r} must end in .svg or .png.", param_hint="--out")
     from nmpcrl.report.figures.runs.run import run_page, write
-    from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.files import write_file
@@ -47,5 +46,5 @@ def show(run: str, out: Path | None) -> None:
     figure = run_page(
         records, None if records.experiment["learner"] == "frozen" else RUNS.read(arm)
     )
-    write_file(out, lambda file: write(figure, file, kind))
-    click.echo(f"{verdict(records)}\n{out}")
+    write_file(out, lambda file: file.write(figure.written(kind)))
+    click.echo(f"{costs_of(records)}\n{out}")

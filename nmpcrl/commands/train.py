@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+from nmpcrl.commands.runs import costs_of
+
 
 class Train(click.Command):
     """A command with an option a field of `Experiment`, which only this command imports."""
@@ -59,7 +61,6 @@ def train(yes: bool, **values: Any) -> None:
     """
     from tqdm import tqdm
 
-    from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment, fetch
     from nmpcrl.study.limits import afford, need_numba
     from nmpcrl.study.store import RUNS
@@ -79,7 +80,7 @@ def train(yes: bool, **values: Any) -> None:
             bar.update(done - bar.n)
 
         records = fetch(experiment, on_episode=on_episode)
-    click.echo(f"{experiment}: {records.facts['stopped']}\n{verdict(records)}")
+    click.echo(f"{experiment}: {records.facts['stopped']}\n{costs_of(records)}")
     if not path.is_file():  # the store has printed the reason
         raise SystemExit(1)
     click.echo(f"{path}\nNext: nmpcrl show {path.stem}")

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.gradient_td import dropped_curvature
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.study import Experiment, paper, run
 
 
@@ -47,3 +48,14 @@ def test_the_dropped_term_is_the_hessian_by_differences(records, everywhere):
     bend = np.linalg.norm(w) * (after.features - before.features) / (2 * t)
     h = (delta - solution.features @ w) * bend
     assert np.linalg.norm(h) == pytest.approx(everywhere.dropped[k - 1], rel=0.05)
+
+
+def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(records):
+    """Against a second solve in the next state, at steps where the features are smooth."""
+    parts, before = directions(records), metrics.theta_before(records)
+    nmpc, steps = paper.nmpc(), records.steps
+    for k in (10, 20, 30):
+        solution = nmpc.solve(steps["state"][k], before[k])
+        after = nmpc.solve(steps["state"][k + 1], before[k], solution)
+        expected = paper.GAMMA * parts.predicted[k] * after.features
+        np.testing.assert_allclose(parts.correction[k], expected, rtol=1e-3, atol=1e-3)

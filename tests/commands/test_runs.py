@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import pytest
 
-from nmpcrl.report.run import verdict
+from nmpcrl.commands.runs import costs_of
 from nmpcrl.study import Experiment, Records, fetch, paper, sweep
 from nmpcrl.study.provenance import key
 from nmpcrl.study.store import RUNS
@@ -73,7 +73,7 @@ def test_a_run_is_trained_once_listed_and_drawn(command, tmp_path, monkeypatch):
     for name in ("GES-A", path.stem, str(path)):
         shown = command("show", name)
         assert shown.exit_code == 0, shown.output
-        assert shown.stdout == f"{verdict(fetch(one))}\n{path.with_suffix('.svg')}\n"
+        assert shown.stdout == f"{costs_of(fetch(one))}\n{path.with_suffix('.svg')}\n"
     page = path.with_suffix(".svg").read_bytes()
     assert page.startswith(b"<?xml")
     assert command("show", "GES", "--out", str(tmp_path / "a.PNG")).exit_code == 0

@@ -1,7 +1,6 @@
-"""Parts of figures that know no runs: a map, a logarithmic axis, a legend, a bar in parts."""
+"""What figures are made of: maps, axes over episodes, curves of runs, logarithmic axes, legends."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -9,29 +8,29 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.container import BarContainer
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
-from nmpcrl.report.figures.sheet import fitting
 from nmpcrl.report.figures.style import (
     BAND,
     DECAY_TITLES,
     INK,
     LOOKS,
+    WIDTH,
+    Drawn,
     hatched,
-    line,
+    in_words,
     subplots,
-    thin,
 )
+from nmpcrl.study.records import Records
+from nmpcrl.study.store import Runs
 
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
 LEAST = 1.5  # high over low of an axis that has hardly anything to show
 FEW = 20  # high over low of an axis on which powers of ten are too few
-WHOLE = {"steps": [1, 2, 2.5, 5, 10], "integer": True, "min_n_ticks": 1}  # of a MaxNLocator
 MAPS = 2  # side by side
 
 
@@ -48,43 +47,85 @@ def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
         above: dict[str, Any] = {"xytext": (0, 7), "textcoords": "offset points", "va": "bottom"}
         axes.annotate("start", tuple(task.start[:2]), ha="left", **above)
         axes.annotate("target", tuple(task.target[:2]), ha="center", **above)
+        axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal")
 
 
-def map_grid(
-    names: Sequence[str], row: float, rest: float, **options: Any
-) -> tuple[Figure, dict[str, Axes], Any]:
-    """A map for each name, to one scale; what is left over in the last row is hidden.
+def panels(
+    names: Sequence[str], row: float, rest: float, columns: int = MAPS, **options: Any
+) -> tuple[Drawn, dict[str, Axes], Any]:
+    """A panel for each name, row by row.
 
     Args:
-        names: of the layouts.
-        row: height of a row of maps [inches].
-        rest: height of what stands above and below them [inches].
+        names: of what is drawn.
+        row: height of a row [inches].
+        rest: height of what stands above and below the rows [inches].
+        columns: at most.
         options: of `subplots`.
 
     Returns:
-        The figure, the map of each name, and all maps row by row.
+        The figure, the panel of each name, and all panels as rows and columns.
     """
-    columns = min(MAPS, len(names))
+    columns = min(columns, len(names))
     rows = -(-len(names) // columns)
-    options = {"squeeze": False, "sharex": True, "sharey": True} | options
-    figure, grid = subplots(rows, columns, row * rows + rest, **options)
+    figure, grid = subplots(rows, columns, row * rows + rest, squeeze=False, **options)
     for axes in grid.flat[len(names) :]:
         axes.set_visible(False)
     return figure, dict(zip(names, grid.flat, strict=False)), grid
 
 
-def label_panel(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
-    """Which decay of the noise a panel shows, and whole episodes below."""
-    axes.set_title(DECAY_TITLES.get(decay, ""), fontsize="medium", fontweight="normal")
+def maps(names: Sequence[str], row: float, rest: float) -> tuple[Drawn, dict[str, Axes]]:
+    """A map for each layout, all to one scale, with its name above; as `panels`."""
+    figure, by_layout, grid = panels(names, row, rest, sharex=True, sharey=True)
+    for name, axes in by_layout.items():
+        axes.set_title(name)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]")
+    return figure, by_layout
+
+
+def over_episodes(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
+    """Name the axis below, on which there is no half of an episode; above, the noise's decay."""
+    if decay:
+        axes.set_title(DECAY_TITLES[decay])
     axes.xaxis.set_major_locator(MaxNLocator(4, integer=True, min_n_ticks=1))
     axes.set_xlabel(xlabel)
 
 
-def over_episodes(axes: Axes, xlabel: str = "episode") -> None:
-    """Name the axis below, on which there is no half of an episode."""
-    axes.xaxis.set_major_locator(MaxNLocator("auto", **WHOLE))
-    axes.set_xlabel(xlabel)
+def each_episode(axes: Axes, values: Vector, **look: Any) -> None:
+    """One value an episode, from episode 1 on; a single one is a point."""
+    mark = {"marker": "o", "markersize": 4} if np.isfinite(values).sum() == 1 else {}
+    axes.plot(np.arange(1, len(values) + 1), values, **(mark | look))
+
+
+def by_decay(
+    runs: Runs[Records],
+    learners: Iterable[str],
+    measure: Callable[[Records], Vector],
+    ylabel: str,
+    height: float = 3.2,
+) -> tuple[Drawn, Any]:
+    """One line a run over the episodes, and a panel for each decay of the noise.
+
+    Args:
+        runs: of one layout.
+        learners: which are drawn.
+        measure: one number an episode of a run.
+        ylabel: what it is.
+        height: of the figure [inches].
+    """
+    decays = runs.values_of("decay")
+    figure, axes = subplots(1, len(decays), height, sharey=True, squeeze=False)
+    for panel, decay in zip(axes[0], decays, strict=True):
+        for learner in learners:
+            for records in runs.select(learner=learner, decay=decay).values():
+                each_episode(panel, measure(records), lw=1.2, **LOOKS[learner].line)
+        over_episodes(panel, decay)
+    axes[0, 0].set_ylabel(ylabel)
+    legend(figure, learners)
+    return figure, axes[0]
 
 
 def plain(axis: Axis) -> None:
@@ -125,37 +166,37 @@ def logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callab
     return lambda drawn: np.clip(np.nan_to_num(drawn, nan=np.inf), low, middle)
 
 
+def logarithmic_if_wide(*row: Axes) -> None:
+    """A run that blows up must not flatten the others, in panels that share a vertical axis."""
+    drawn = [np.asarray(line.get_ydata(), float) for axes in row for line in axes.get_lines()]
+    values = np.concatenate(drawn)
+    values = values[np.isfinite(values)]
+    if values.size and values.max() > 5 * values.min():
+        row[0].set_yscale("log")
+
+
 def jitter(count: int, width: float) -> Vector:
     """Places beside each other, so that no run hides another."""
     return np.linspace(-width, width, count) if count > 1 else np.zeros(count)
 
 
-def below(
-    figure: Figure, handles: Sequence[Any], labels: Sequence[str] | None = None, **look: Any
-) -> None:
+def below(figure: Drawn, handles: Sequence[Any], labels: Sequence[str] | None = None) -> None:
     """A legend below all panels, in as many columns as there is room for."""
     names = [str(handle.get_label()) for handle in handles] if labels is None else [*labels]
-    shown: dict[str, Any] = {"ncols": fitting(names), "alignment": "left", **look}
-    figure.legend(handles, names, loc="outside lower left", **shown)
+    widest = 4.5 + 0.58 * max(len(in_words(name)) for name in names)  # in letters of 10 points
+    columns = max(1, int(7.2 * WIDTH / widest))
+    figure.legend(handles, names, loc="outside lower left", ncols=columns, alignment="left")
 
 
-def legend(figure: Figure, learners: Iterable[str], *others: Line2D) -> None:
+def legend(figure: Drawn, learners: Iterable[str], *others: Line2D) -> None:
     """One entry a learner, below all panels."""
-    below(figure, [*(Line2D([], [], label=name, **line(name)) for name in learners), *others])
+    below(figure, [*(Line2D([], [], label=name, **LOOKS[name].line) for name in learners), *others])
 
 
-def one_entry_each(
-    axes: Axes,
-    learners: tuple[str, ...],
-    names: Mapping[str, str] = MappingProxyType({}),
-    *,
-    marker: bool = False,
-) -> None:
-    """A legend with one entry a learner, however many lines it has."""
-    for learner in learners:
-        look = {**thin(learner), "marker": LOOKS[learner].marker if marker else None}
-        axes.plot([], [], label=names.get(learner, learner), **look)
-    axes.legend()
+def interval(axes: Axes, y: float, estimate: Any, **look: Any) -> None:
+    """A point with its interval of 95 %, at a height; `estimate` has value, low and high."""
+    axes.hlines(y, estimate.low, estimate.high, color=look["color"], linewidth=1.6)
+    axes.plot(estimate.value, y, **({"marker": "o", "markersize": 5, "linestyle": ""} | look))
 
 
 def stacked(
@@ -169,10 +210,10 @@ def stacked(
     return bars
 
 
-def logarithmic_if_wide(row: list[Axes]) -> None:
-    """A run that blows up must not flatten the others."""
-    points = [line.get_ydata() for axes in row for line in axes.get_lines()]
-    values = np.concatenate([np.asarray(y, float) for y in points])
-    values = values[np.isfinite(values)]
-    if values.size and values.max() > 5 * values.min():
-        row[0].set_yscale("log")
+def middle_half(
+    axes: Axes, along: Vector, runs: Matrix, color: str, method: str = "linear", **look: Any
+) -> None:
+    """The median of some runs, shape (runs, points), and a band from quartile to quartile."""
+    low, median, high = np.nanquantile(runs, (0.25, 0.5, 0.75), axis=0, method=method)  # type: ignore[call-overload]
+    axes.fill_between(along, low, high, color=color, alpha=0.15, linewidth=0)
+    axes.plot(along, median, color=color, **look)

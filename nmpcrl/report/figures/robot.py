@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from nmpcrl import Matrix
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task
-from nmpcrl.report.figures.sheet import PAGE
-from nmpcrl.report.figures.style import INK, TEAL, WINE
+from nmpcrl.report.figures.style import INK, PAGE, TEAL, WINE
 
 SIZE, DOTS = (6.4, 6.4), 100  # inches, and dots an inch
 MARGIN = 0.4  # around the box, in which the walls are seen [m]
@@ -35,10 +34,7 @@ def frame(task: Task, states: Matrix) -> NDArray[np.uint8]:
         axes.plot([left, right, right, left, left], [bottom, bottom, top, top, bottom], color=INK)
         axes.plot(states[:, 0], states[:, 1], color=TEAL)
         _robot(axes, task, states[-1])
-        axes.set(
-            xlim=(left - MARGIN, right + MARGIN), ylim=(bottom - MARGIN, top + MARGIN),
-            xlabel="x [m]", ylabel="y [m]",
-        )  # fmt: skip
+        axes.set(xlim=(left - MARGIN, right + MARGIN), ylim=(bottom - MARGIN, top + MARGIN))
         axes.set_title(f"after {len(states) - 1} steps, {_away(task, states[-1]):.2f} m to go")
         canvas.draw()
         return np.array(canvas.buffer_rgba())[:, :, :3]

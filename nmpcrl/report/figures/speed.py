@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
@@ -21,12 +20,12 @@ from nmpcrl.report.figures.style import (
     LIMIT,
     LOOKS,
     STEP_PARTS,
-    SUBTITLE,
     TEAL,
     WINE,
-    headed,
+    Drawn,
     page,
     subplots,
+    titled,
 )
 
 STARTS = {"cold": (INK, "o-"), "shifted": (TEAL, "s--"), "same state": (WINE, "D-.")}
@@ -44,7 +43,7 @@ SMALL: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small"}
 @page
 def row_prices(
     h: Vector, penalties: Mapping[float, Vector], prices: Mapping[float, Vector]
-) -> Figure:
+) -> Drawn:
     """What a row adds to the objective, and its multiplier, for some barrier parameters.
 
     Args:
@@ -60,16 +59,16 @@ def row_prices(
     weight = penalties[min(penalties)][-1] / h[-1]
     left.plot(h, np.maximum(0, weight * h), color=INK, lw=0.8)
     right.plot(h, np.heaviside(h, 0.5), color=INK, lw=0.8, label="μ → 0")
-    left.set_title("the cost of its slack", **SUBTITLE)
+    left.set_title("the cost of its slack")
     left.set(xlabel="$h$ (no unit)", ylabel=r"$W \sigma$ [cost]")
-    right.set_title("its multiplier", **SUBTITLE)
+    right.set_title("its multiplier")
     right.set(xlabel="$h$ (no unit)", ylabel=r"$\lambda / W$ (no unit)")
     below(figure, *right.get_legend_handles_labels())
-    return headed(figure, "The barrier rounds a kink off, and turns a step into a smooth price")
+    return titled(figure, "The barrier rounds a kink off, and turns a step into a smooth price")
 
 
 @page
-def sparsity(by_kind: Matrix, folded: Matrix, step: int) -> Figure:
+def sparsity(by_kind: Matrix, folded: Matrix, step: int) -> Drawn:
     """Where the KKT matrix is not zero: sorted by kind, and by stage with its rows folded away.
 
     Args:
@@ -81,14 +80,14 @@ def sparsity(by_kind: Matrix, folded: Matrix, step: int) -> Figure:
     titles = (f"{len(by_kind)} unknowns by kind", f"{len(folded)} by stage, rows folded away")
     for axes, matrix, title in zip(panels, (by_kind, folded), titles, strict=True):
         axes.spy(matrix, markersize=max(0.3, 190 / len(matrix)), color=INK, marker="s", mew=0)
-        axes.set_title(title, **SUBTITLE)
+        axes.set_title(title)
         axes.set(xticks=[], yticks=[], xlabel=f"bandwidth {bandwidth(matrix)} [unknowns]")
         axes.spines[["top", "right"]].set_visible(True)
     corner = len(folded) - step - 0.5
     look: dict[str, Any] = {"fill": False, "ec": WINE, "lw": 1.8, "zorder": 5, "clip_on": False}
     panels[1].add_patch(Rectangle((corner, corner), step, step, **look))
     far = bandwidth(folded)
-    return headed(figure, f"Stage by stage, no entry is farther than {far} from the diagonal")
+    return titled(figure, f"Stage by stage, no entry is farther than {far} from the diagonal")
 
 
 def bandwidth(matrix: Matrix) -> int:
@@ -100,7 +99,7 @@ def bandwidth(matrix: Matrix) -> int:
 @page
 def convergence(
     straight: pd.DataFrame, traces: Mapping[str, pd.DataFrame], tolerance: float
-) -> Figure:
+) -> Drawn:
     """The KKT error of a cold solve with two Hessians, and of the solves from three starts.
 
     Args:
@@ -112,24 +111,24 @@ def convergence(
     left.loglog(straight.index + 1, straight.error, color=TEAL, ls="--", label="Gauss-Newton")
     exact = traces["cold"].error
     left.loglog(exact.index + 1, exact, "o-", color=INK, ms=4, label="exact Hessian")
-    left.set_title("a cold solve", **SUBTITLE)
+    left.set_title("a cold solve")
     left.set(xlabel="iteration + 1 (no unit)", ylabel="KKT error (no unit)")
     left.legend(fontsize="small", loc="lower left")
     for name, iterates in traces.items():
         color, line = STARTS[name]
         right.semilogy(iterates.error, line, color=color, ms=4, label=name)
     right.xaxis.set_major_locator(MaxNLocator(integer=True))
-    right.set_title("three starts", **SUBTITLE)
+    right.set_title("three starts")
     right.set(xlabel="iteration (no unit)")
     right.legend(fontsize="small")
     for axes in (left, right):
         axes.axhline(tolerance, **LIMIT)
     counts = ", ".join(f"{name} {len(iterates) - 1}" for name, iterates in traces.items())
-    return headed(figure, f"Iterations with the exact Hessian: {counts}")
+    return titled(figure, f"Iterations with the exact Hessian: {counts}")
 
 
 @page
-def learning_steps(timings: pd.DataFrame) -> Figure:
+def learning_steps(timings: pd.DataFrame) -> Drawn:
     """What a learning step is made of with the fastest and the paper's solver, a bar a learner.
 
     Args:
@@ -140,12 +139,12 @@ def learning_steps(timings: pd.DataFrame) -> Figure:
     for panel, solver in zip(axes, ("riccati", "ipopt"), strict=True):
         parts = _parts(timings[timings.solver == solver])
         stacked(panel, parts, STEP_PARTS, 0.65)
-        panel.set_title(f"with {solver}", **SUBTITLE)
+        panel.set_title(f"with {solver}")
         panel.set_xlabel("a step [ms]")
         shares.append(f"{parts.network['RDES'] / parts.loc['RDES'].sum():.0%} with {solver}")
     axes[0].invert_yaxis()
     below(figure, *axes[0].get_legend_handles_labels())
-    return headed(figure, f"Of a step of RDES the network takes {' and '.join(shares)}")
+    return titled(figure, f"Of a step of RDES the network takes {' and '.join(shares)}")
 
 
 def _parts(timings: pd.DataFrame) -> pd.DataFrame:
@@ -156,7 +155,7 @@ def _parts(timings: pd.DataFrame) -> pd.DataFrame:
 
 
 @page
-def saving(timings: pd.DataFrame, others: Mapping[str, float]) -> Figure:
+def saving(timings: pd.DataFrame, others: Mapping[str, float]) -> Drawn:
     """Claim C3: a step of RDES over one of ES, against the time of one solve.
 
     Args:
@@ -188,7 +187,7 @@ def saving(timings: pd.DataFrame, others: Mapping[str, float]) -> Figure:
     )
     axes.set(ylim=(0, None))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    return headed(figure, f"RDES saves time from a solve of about {model.break_even:.1g} ms on")
+    return titled(figure, f"RDES saves time from a solve of about {model.break_even:.1g} ms on")
 
 
 def _mark(axes: Axes, solver: str, solve: float, ratio: float, *, face: str) -> None:

@@ -1,21 +1,105 @@
-"""What all figures share: the look of each learner, of a line and of a page."""
+"""What all figures share: the page that they are drawn on, and the look of a learner and a line."""
 
 import re
+from base64 import b64encode
+from collections.abc import Callable
 from dataclasses import dataclass
-from textwrap import fill
-from typing import Any
+from functools import wraps
+from io import BytesIO
+from typing import Any, ParamSpec
 
 import numpy as np
-from matplotlib import colormaps
+from IPython.display import display
+from matplotlib import colormaps, rc_context
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties
 
-from nmpcrl import Vector
-from nmpcrl.report.figures.sheet import mosaic as mosaic
-from nmpcrl.report.figures.sheet import page as page
-from nmpcrl.report.figures.sheet import subplots as subplots
-from nmpcrl.study.paper import THETA_NAMES
+PAGE: dict[Any, Any] = {
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": "medium",
+    "figure.dpi": 150,
+    "figure.titlesize": 10.5,
+    "figure.titleweight": "bold",
+    "font.size": 10.0,  # "small" is 8.3
+    "legend.frameon": False,
+    "lines.linewidth": 1.6,
+    "svg.fonttype": "path",  # an image has no fonts but its own, and nobody searches in it
+    "svg.hashsalt": "nmpcrl",  # the same figure, the same bytes
+}
+WIDTH = 5.0  # inches: a page 390 pixels wide shows 10 points as 10 pixels
+HEAVY = 300_000  # bytes of an SVG from which on a PNG is shown
+
+Parameters = ParamSpec("Parameters")
+
+
+class Drawn(Figure):
+    """A figure of the page's width that shows itself as an SVG or, where that is heavy, a PNG."""
+
+    def __init__(self, height: float) -> None:
+        super().__init__(figsize=(WIDTH, height), layout="constrained")
+
+    @property
+    def finding(self) -> str:
+        """The title in words."""
+        return in_words(self.get_suptitle())
+
+    def written(self, kind: str) -> bytes:
+        """The figure as "svg" or "png"; the same figure gives the same bytes."""
+        file, about = BytesIO(), {"Date": None} if kind == "svg" else None
+        with rc_context(PAGE):
+            self.draw_without_rendering()  # titles wrap, and the layout has room for them
+            self.savefig(file, format=kind, metadata=about)
+        return file.getvalue()
+
+    def _ipython_display_(self) -> None:
+        svg = self.written("svg")
+        shown = {"text/plain": self.finding}
+        if len(svg) < HEAVY:
+            shown["image/svg+xml"] = svg.decode()
+        else:
+            shown["image/png"] = b64encode(self.written("png")).decode()
+        display(shown, raw=True)  # type: ignore[no-untyped-call]
+
+
+def page(draw: Callable[Parameters, Drawn]) -> Callable[Parameters, Drawn]:
+    """Let a function draw with the look of `PAGE`."""
+
+    @wraps(draw)
+    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Drawn:
+        with rc_context(PAGE):
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def subplots(
+    rows: int = 1, columns: int = 1, height: float = 3.2, **options: Any
+) -> tuple[Drawn, Any]:
+    """A figure of a height [inches] and its axes, as `Figure.subplots` returns them."""
+    figure = Drawn(height)
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def titled(figure: Drawn, title: str, source: str = "") -> Drawn:
+    """The figure with its finding above, on as many lines as it takes, and its runs' source below.
+
+    Args:
+        figure: all panels.
+        title: the finding.
+        source: where the runs come from.
+    """
+    unbroken = re.sub(r"\$.*?\$", lambda math: math[0].replace(" ", "{}"), title)
+    figure.suptitle(unbroken, x=0.01, ha="left", wrap=True)
+    if source:
+        figure.supxlabel(source, x=0.99, ha="right", fontsize="small", color="0.35", wrap=True)
+    return figure
+
+
+def in_words(title: str) -> str:
+    """A title without LaTeX, to be read aloud: theta_x and a dollar at either end is "theta_x"."""
+    return " ".join(re.sub(r"\\mathrm|\\var|[$\\{}]", "", title.replace("{}", " ")).split())
 
 
 @dataclass(frozen=True)
@@ -31,6 +115,11 @@ class Look:
         """Keyword arguments of a line without markers."""
         return {"color": self.color, "linestyle": self.linestyle}
 
+    def dots(self, **others: Any) -> dict[str, Any]:
+        """Keyword arguments of single runs as points."""
+        look = {"color": self.color, "marker": self.marker, "linestyle": "", "markersize": 4}
+        return look | others
+
 
 LOOKS = {
     "ES": Look("#0072B2", "-", "o"),
@@ -44,54 +133,23 @@ LOOKS = {
     "random": Look("#8C5A2B", (0, (1, 1)), ">"),
 }
 
-INK, TEAL, WINE = "0.25", "#1B7F79", "#882255"  # none of them is a learner's
+INK, TEAL, WINE, OCHRE = "0.25", "#1B7F79", "#882255", "#B37A00"  # none is a learner's of the paper
+QUIET = "0.55"  # the grey of what only stands behind
 AT_ONE: dict[str, Any] = {"color": "0.5", "linewidth": 0.9}  # what a ratio is compared to
 BAND: dict[str, Any] = {"facecolor": "0.92", "edgecolor": "0.5", "linewidth": 0.6, "zorder": 0}
-MARK = 78  # characters of a line
-QUIET = "0.55"  # the grey of what only stands behind
-PALE = 0.8  # of a grey that is too pale to be seen on white
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
-SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
-VIEW_TITLES = {  # of an NMPC among obstacles that move
-    "known": "knows the motion", "extrapolated": "extrapolates", "frozen": "as if they stood",
-}  # fmt: skip
-VIEW_LINES: dict[str, dict[str, Any]] = {
-    "known": {"color": TEAL, "linestyle": "-"},
-    "extrapolated": {"color": "#B37A00", "linestyle": (0, (5, 1))},
-    "frozen": {"color": WINE, "linestyle": "-."},
-}
 DECAY_TITLES = {"step": "noise decays per step", "episode": "noise decays per episode"}
-SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
-    "x": r"\theta_x",
-    "y": r"\theta_y",
-    "heading": r"\theta_\varphi",
-    "v": r"\theta_v",
-    "nu": r"\theta_\nu",
-    "x_f": r"\theta_{x_f}",
-    "y_f": r"\theta_{y_f}",
-    "heading_f": r"\theta_{\varphi_f}",
-    "c": r"\theta_c",
+MEANINGS = {  # of paper.THETA_NAMES: the symbol, and a word or two
+    "x": (r"$\theta_x$", "place along x"),
+    "y": (r"$\theta_y$", "place along y"),
+    "heading": (r"$\theta_\varphi$", "heading"),
+    "v": (r"$\theta_v$", "speed"),
+    "nu": (r"$\theta_\nu$", "turn rate"),
+    "x_f": (r"$\theta_{x_f}$", "last place along x"),
+    "y_f": (r"$\theta_{y_f}$", "last place along y"),
+    "heading_f": (r"$\theta_{\varphi_f}$", "last heading"),
+    "c": (r"$\theta_c$", "clearance"),
 }
-MEANINGS = {  # of paper.THETA_NAMES, in a word or two
-    "x": "place along x",
-    "y": "place along y",
-    "heading": "heading",
-    "v": "speed",
-    "nu": "turn rate",
-    "x_f": "last place along x",
-    "y_f": "last place along y",
-    "heading_f": "last heading",
-    "c": "clearance",
-}
-TOLD_APART = ("v", "nu")  # whose symbols look alike where letters are small
-
-
-def symbol(name: str) -> str:
-    """A component of theta as a figure names it, with a word where its symbol needs one."""
-    word = f" ({MEANINGS[name]})" if name in TOLD_APART else ""
-    return f"${SYMBOLS[name]}${word}"
-
-
 STEP_PARTS = {  # of a learning step: colour and hatching
     "solves": ("0.2", ""),
     "network": ("0.42", "//"),
@@ -104,49 +162,7 @@ def shades(count: int) -> list[str]:
     return [to_hex(color) for color in colormaps["plasma"](np.linspace(0.0, 0.62, count))]
 
 
-def line(learner: str) -> dict[str, Any]:
-    """How a median is drawn."""
-    return {**LOOKS[learner].line, "linewidth": 1.6}
-
-
-def thin(learner: str) -> dict[str, Any]:
-    """How one of several lines of a learner is drawn."""
-    return {**LOOKS[learner].line, "linewidth": 1.2, "markersize": 3.5}
-
-
-def dots(learner: str, **others: Any) -> dict[str, Any]:
-    """How single runs are drawn as points."""
-    look = LOOKS[learner]
-    style = {"color": look.color, "marker": look.marker, "linestyle": "", "markersize": 4}
-    return style | others
-
-
 def hatched(color: str, hatch: str) -> dict[str, Any]:
     """How a part of a bar is drawn: a pale one has an outline."""
-    edge = "0.5" if min(to_rgb(color)) > PALE else "white"
+    edge = "0.5" if min(to_rgb(color)) > 0.8 else "white"
     return {"facecolor": color, "hatch": hatch, "edgecolor": edge, "linewidth": 0.5}
-
-
-def headed(figure: Figure, finding: str) -> Figure:
-    """The figure with the finding above all panels, on as many lines as it takes."""
-    unbroken = re.sub(r"\$.*?\$", lambda math: math[0].replace(" ", "{}"), finding)
-    look: dict[str, Any] = {"ha": "left", "fontsize": 10.5, "fontweight": "bold", "wrap": True}
-    figure.suptitle(unbroken, x=0.01, **look)
-    return figure
-
-
-def marked(figure: Figure, mark: str) -> Figure:
-    """The figure with a line that says where its runs come from: below, or above its legend."""
-    if figure.legends:
-        legend = figure.legends[0]
-        legend.set_title(fill(mark, MARK), prop=FontProperties(size="small"))
-        legend.get_title().set_color("0.35")
-        return figure
-    figure.supxlabel(mark, x=0.99, ha="right", fontsize="small", color="0.35", wrap=True)
-    return figure
-
-
-def most_moved(change: Vector) -> str:
-    """A title: which component moved most, in any run."""
-    most = int(np.argmax(change))
-    return f"${SYMBOLS[THETA_NAMES[most]]}$ moves most, by up to {change[most]:.2g}"

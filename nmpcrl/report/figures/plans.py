@@ -4,30 +4,27 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
-from nmpcrl.report.figures.axes import below, draw_task, map_grid
+from nmpcrl.report.figures.axes import below, draw_task, maps
 from nmpcrl.report.figures.style import (
     INK,
     MEANINGS,
-    SYMBOLS,
     TEAL,
     WINE,
-    headed,
+    Drawn,
     page,
     shades,
     subplots,
-    symbol,
+    titled,
 )
 
 
 @page
-def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
+def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Drawn:
     """The closed-loop trajectory without noise, and some of the plans behind it."""
     figure, axes = subplots(height=3.1)
     draw_task(axes, task)
@@ -35,16 +32,15 @@ def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figu
     for i, plan in enumerate(plans):
         label = "plans" if i == 0 else None
         axes.plot(*plan.states[:, :2].T, ".-", color=WINE, lw=2.2, ms=5, label=label)
-    farthest = max((_length(plan.states) for plan in plans), default=0.0)
-    axes.set(xlabel="x [m]", ylabel="y [m]")
     below(figure, *axes.get_legend_handles_labels())
     axes.margins(0.04)
+    farthest = max(_length(plan.states) for plan in plans)
     title = f"Plans of at most {farthest:.1f} m make a trajectory of"
-    return headed(figure, f"{title} {_length(rollout.states):.1f} m")
+    return titled(figure, f"{title} {_length(rollout.states):.1f} m")
 
 
 @page
-def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
+def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Drawn:
     """Plans against the closed loop, around the plan that ends farthest from where the robot goes.
 
     Args:
@@ -69,17 +65,15 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
     drawn = np.vstack([path[first : shown[-1] + horizon], *(plans[i].states[:, :2] for i in shown)])
     low, high = drawn.min(axis=0) - [0.3, 0.5], drawn.max(axis=0) + [0.3, 0.5]
     axes.set(xlabel="x [m]", ylabel="y [m]", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    axes.set_title(
-        f"The end of a plan is up to {apart[farthest]:.2f} m from the place reached at that time"
-    )
     below(figure, axes.get_legend_handles_labels()[0])
-    return figure
+    title = f"The end of a plan is up to {apart[farthest]:.2f} m from the place"
+    return titled(figure, f"{title} reached at that time")
 
 
 @page
 def action_values(
     speeds: Vector, turn_rates: Vector, values: Matrix, value: float, policy: Vector
-) -> Figure:
+) -> Drawn:
     """Q(s, a) over a grid of first actions, one line a speed, above the level V(s).
 
     Args:
@@ -90,28 +84,25 @@ def action_values(
         policy: the action of V(s), shape (2,).
     """
     figure, axes = subplots(height=3.6)
-    palest_first = shades(len(speeds))[::-1]
-    for speed, column, shade in zip(speeds, values.T, palest_first, strict=True):
+    for speed, column, shade in zip(speeds, values.T, shades(len(speeds))[::-1], strict=True):
         axes.plot(turn_rates, column, ".-", color=shade, label=f"Q at {speed:g} m/s")
     axes.axhline(value, color=WINE, ls="--", lw=1.2, label="V(s)")
     axes.plot(policy[1], value, "D", color=WINE, ms=7, label="the policy's action")
-    above = np.nanmin(values) > value - 1e-4
-    axes.set(
-        title="Q equals V at the policy's action, and is no lower elsewhere"
-        if above
-        else "Q falls below V: V was a local optimum",
-        xlabel="turn rate of the first action [rad/s]",
-        ylabel="value [cost]",
-    )
-    handles, labels = axes.get_legend_handles_labels()
-    below(figure, handles, labels)
-    return figure
+    axes.set(xlabel="turn rate of the first action [rad/s]", ylabel="value [cost]")
+    below(figure, *axes.get_legend_handles_labels())
+    return titled(figure, "Q equals V at the policy's action, and is no lower elsewhere")
+
+
+SIDES: tuple[tuple[str, str, float, str], ...] = (  # of two changes: colour, line, and its words
+    (TEAL, "-", 0.0, "left"),
+    (WINE, "--", 1.0, "right"),
+)
 
 
 @page
 def theta_effects(
     task: Task, middle: Rollout, others: Mapping[str, Mapping[str, Rollout]]
-) -> Figure:
+) -> Drawn:
     """One panel a parameter: the trajectory of theta_init, and of two other values.
 
     Args:
@@ -119,67 +110,47 @@ def theta_effects(
         middle: the closed loop of theta_init.
         others: name of the parameter -> how it was changed -> closed loop; two changes each.
     """
-    moved = {
-        name: max(_apart(middle, rollout) for rollout in changes.values())
-        for name, changes in others.items()
-    }
-    most = sorted(moved, key=lambda name: -moved[name])
-    figure, maps, grid = map_grid(list(others), 1.5, 0.5)
+    figure, by_name = maps(list(others), 1.5, 0.5)
+    moved = {}
     for name, changes in others.items():
-        axes = maps[name]
+        axes = by_name[name]
         draw_task(axes, task, labels=False)
         _trajectory(axes, middle, INK, ":")
-        for (change, rollout), side in zip(changes.items(), _SIDES, strict=False):
-            _trajectory(axes, rollout, side["color"], side["line"])
-            cost = f"{rollout.cost:.0f}" if np.isfinite(rollout.cost) else "fails"
-            where = {"x": side["x"], "y": 0.03, "ha": side["ha"], "color": side["color"]}
-            axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize="small", **where)
-        title = f"${SYMBOLS[name]}$ {MEANINGS[name]}"
-        axes.set_title(title, fontsize="medium", fontweight="normal")
-    bottom, top = grid[0, 0].get_ylim()
-    grid[0, 0].set_ylim(bottom - 1, top)
-    for axes in grid[-1]:
-        axes.set_xlabel("x [m]")
-    for axes in grid[:, 0]:
-        axes.set_ylabel("y [m]")
-    first, second, *_ = most
-    return headed(figure, f"{symbol(first)} and {symbol(second)} bend the trajectory most")
+        for (change, rollout), (color, line, x, side) in zip(changes.items(), SIDES, strict=True):
+            _trajectory(axes, rollout, color, line)
+            where: dict[str, Any] = {"transform": axes.transAxes, "fontsize": "small"}
+            axes.text(x, 0.03, f"{change}: {rollout.cost:.0f}", color=color, ha=side, **where)
+        moved[name] = max(_apart(middle, rollout) for rollout in changes.values())
+        axes.set_title(" ".join(MEANINGS[name]))
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(bottom - 1, top)
+    first, second, *_ = (
+        "{} ({})".format(*MEANINGS[one]) for one in sorted(moved, key=moved.get)[::-1]
+    )
+    return titled(figure, f"{most} bend the trajectory most")
 
 
 @page
-def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Figure:
+def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Drawn:
     """The trajectory in the box of departure A, and in the box as the paper prints it."""
     figure, axes = subplots(height=3.2)
     draw_task(axes, task)
     axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
-    axes.annotate(
-        f"$d_t$ = {task.near:g} m",
-        task.target[:2] + [0, task.near],
-        (0, 4),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-    )
+    place = task.target[:2] + [0, task.near + 0.1]
+    axes.text(*place, f"$d_t$ = {task.near:g} m", ha="center", va="bottom")
     axes.axvline(wall, color=WINE, lw=1)
-    axes.annotate(
-        f"wall at x = {wall:g} m ", (wall, 1), xycoords=("data", "axes fraction"),
-        ha="right", va="top", color=WINE,
-    )  # fmt: skip
+    words: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": WINE}
+    axes.text(wall, 1, f"wall at x = {wall:g} m ", ha="right", va="top", **words)
     axes.plot(*repaired.states[:, :2].T, color=INK, ls=":", label="box [−3, 9]² (used here)")
     axes.plot(*printed.states[:, :2].T, color=WINE, lw=2, label="box [−9, 3]² (as printed)")
-    nearest = np.linalg.norm(printed.states[:, :2] - task.target[:2], axis=1).min()
-    axes.set(
-        title=f"In the printed box the robot comes no nearer than {nearest:.1f} m",
-        xlabel="x [m]",
-        ylabel="y [m]",
-    )
     axes.margins(0.04)
     below(figure, *axes.get_legend_handles_labels())
-    return figure
+    nearest = np.linalg.norm(printed.states[:, :2] - task.target[:2], axis=1).min()
+    return titled(figure, f"In the printed box the robot comes no nearer than {nearest:.1f} m")
 
 
 @page
-def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
+def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Drawn:
     """Where the RL penalty begins, where the NMPC keeps away, and what theta_c does about it.
 
     Args:
@@ -187,37 +158,28 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
         theta_c: the values tried, the first one that of theta_init, shape (k,).
         costs: noise-free cost of each; infinite where a solve failed, shape (k,).
     """
-    figure, (left, right) = subplots(1, 2, across=1, tall=5.4)
+    figure, (above, low) = subplots(2, 1, height=5.4)
     kept = task.discs[2][0] / 2  # centre distance at which Xi = 0 [m]
     distance = np.linspace(0.9 * kept, 1.25 * kept, 200)
     penalty = task.penalty * np.maximum(0, 1 - (distance / kept) ** 2 + task.margin)
     begins = kept * np.sqrt(1 + task.margin)
     keeps = kept * np.sqrt(1 + theta_c[0])
-    left.plot(distance, penalty, color=INK)
-    left.axvline(keeps, color=WINE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
-    left.axvline(begins, color=TEAL, ls="-.", label=f"the penalty begins at {begins:.3f} m")
-    left.set(title="The penalty begins too early", xlabel="distance to a centre [m]")
-    left.set_ylabel("penalty of a step [cost]")
-    left.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2))
+    above.plot(distance, penalty, color=INK)
+    above.axvline(keeps, color=WINE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
+    above.axvline(begins, color=TEAL, ls="-.", label=f"the penalty begins at {begins:.3f} m")
+    above.set(xlabel="distance to a centre [m]", ylabel="penalty of a step [cost]")
+    above.legend(loc="upper right")
     order = np.argsort(theta_c)
-    right.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
-    right.axvline(task.margin, color=TEAL, ls="-.", lw=1)
-    best = int(np.argmin(costs))
-    right.set(
-        title=f"$\\theta_c$ = {theta_c[best]:.2f} has the lowest cost",
-        xlabel="$\\theta_c$ (no unit)",
-        ylabel="noise-free RL cost",
+    low.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
+    low.axvline(task.margin, color=TEAL, ls="-.", lw=1)
+    low.set(xlabel=r"$\theta_c$ (no unit)", ylabel="noise-free RL cost")
+    best = theta_c[np.argmin(costs)]
+    return titled(
+        figure, f"The penalty begins too early; $\\theta_c$ = {best:.2f} has the lowest cost"
     )
-    return figure
 
 
-_SIDES: tuple[dict[str, Any], ...] = (
-    {"color": TEAL, "line": "-", "x": 0.0, "ha": "left"},
-    {"color": WINE, "line": "--", "x": 1.0, "ha": "right"},
-)  # of the first and of the second change
-
-
-def _trajectory(axes: Axes, rollout: Rollout, color: str, line: str) -> None:
+def _trajectory(axes: Any, rollout: Rollout, color: str, line: str) -> None:
     """The path, and an arrow for the heading at its end."""
     axes.plot(*rollout.states[:, :2].T, color=color, ls=line, lw=1.3)
     x, y, heading = rollout.states[-1]

@@ -1,1 +1,0 @@
-"""The controller: its plans, its action values, and the gradient of its value."""

@@ -1,1 +1,0 @@
-"""What a learner does, from the few runs that a chapter trains."""

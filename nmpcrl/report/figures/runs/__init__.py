@@ -1,1 +1,0 @@
-"""Runs: their curves, their rollouts, and one run looked at closely."""

@@ -1,1 +1,0 @@
-"""Verdicts: each claim, why runs went wrong, and where a verdict changes."""
