@@ -80,7 +80,7 @@ import sys
 sys.argv[1:] = "train --learner RDES --episodes 1 --steps 3".split()
 main()
 """,
-    "[book]": "import ipykernel, papermill\nfrom nmpcrl.report.figures.runs import trials",
+    "[book]": "import ipykernel, papermill\nfrom nmpcrl.report.figures import trials",
 }  # fmt: skip
 BARE = 750  # MB that an installation without extras may take, of which CasADi and LLVM are 450
 

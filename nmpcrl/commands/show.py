@@ -29,7 +29,7 @@ def show(run: str, out: Path | None) -> None:
     kind = out.suffix.lower().removeprefix(".")
     if kind not in ("svg", "png"):
         raise click.BadParameter(f"{str(out)!r} must end in .svg or .png.", param_hint="--out")
-    from nmpcrl.report.figures.runs.run import run_page, write
+    from nmpcrl.report.figures.run import run_page
     from nmpcrl.study import Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.files import write_file

@@ -38,7 +38,8 @@ class Cited:
     quantity: str
 
     def __format__(self, form: str) -> str:
-        return cited(format(self.value, form), self.value, self.quantity)
+        words = format(self.value, form).replace("inf%", "∞").replace("inf", "∞")
+        return cited(words, self.value, self.quantity)
 
     def __str__(self) -> str:
         return format(self)

@@ -1,13 +1,10 @@
 """The drawn layouts as a page shows them: in short, claim by claim, the nearest to the paper."""
 
-import re
-from html import escape
-
 import pandas as pd
 
+from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.investigation import counted
 from nmpcrl.claims.thresholds import improves
-from nmpcrl.report.tables import BADGES, html_table
 from nmpcrl.studies.difficulty import OPEN, PILOT
 from nmpcrl.studies.population import CLAIMS, EXPECTED, Drawn
 from nmpcrl.study.drawn import name_of
@@ -43,26 +40,19 @@ def label(claim: str) -> str:
     return claim if claim.endswith("improves") else f"{claim}: {short}"
 
 
-def share_table(shares: pd.DataFrame) -> str:
-    """One row a claim, in HTML.
+def share_table(shares: pd.DataFrame) -> pd.DataFrame:
+    """In how many of the drawn layouts each claim holds, with its interval of 95 %, a row a claim.
 
     Args:
         shares: of `population.shares`.
     """
-    header = ("Claim", "Holds in", "By the rule", "Expected")
-    caption = "In how many of the drawn layouts each claim holds, with its interval of 95 %."
-    return html_table(caption, header, (_cells(row) for _, row in shares.iterrows()), headed=True)
-
-
-def _cells(row: pd.Series) -> tuple[str, ...]:
-    expected = EXPECTED[row.claim]
-    counted = f"{row.holding} of {row.layouts}<br>{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]"
-    if row.weaker != row.holding:
-        counted += f"<br>weaker question: {row.weaker} of {row.layouts}"
-    badge = f'<span class="{BADGES[row.outcome]}">{row.outcome}</span>'
-    return (_claim(row.claim), counted, badge, f"{expected.low:.0%} to {expected.high:.0%}")
-
-
-def _claim(name: str) -> str:
-    """A claim's label as HTML, its formulas as those of a page, which are typeset there."""
-    return re.sub(r"\$([^$]*)\$", r'<span class="math">\(\1\)</span>', escape(label(name)))
+    rows = {}
+    for row in shares.itertuples():
+        expected, share = EXPECTED[str(row.claim)], Estimate(row.share, row.low, row.high)
+        rows[row.claim] = {
+            "holds in": f"{row.holding} of {row.layouts}: {share:.0%}",
+            "weaker question": f"{row.weaker} of {row.layouts}",
+            "by the rule": row.outcome,
+            "expected": f"{expected.low:.0%} to {expected.high:.0%}",
+        }
+    return pd.DataFrame.from_dict(rows, "index")

@@ -1,17 +1,15 @@
 """Both editions side by side: verdicts, answers and numbers of the first, and of what is published.
 
-`first_edition.json`, beside the published tables, has what the first edition came to. It was
-written from commit be2ed13 by `first_edition`, before any row was made anew, and never changes.
+`first_edition.json`, beside the published tables, has what the first edition came to, commit
+be2ed13. It was written before any row was made anew, and never changes.
 The rule for a comparison is of the same date: an outcome stands if it is the same word, and a
 number with an interval stands if the two intervals overlap.
 """
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
-from html import escape
-from math import isfinite
 from typing import Any
 
 import pandas as pd
@@ -26,7 +24,6 @@ from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import RUNS, SEARCHES, TIMINGS
 from nmpcrl.claims.verdict import Outcome, Verdict
 from nmpcrl.report.cited import Count
-from nmpcrl.report.tables import BADGES, html_table
 from nmpcrl.report.text import SURE
 from nmpcrl.studies import interventions, population, remedies
 from nmpcrl.studies.agents import SAC_AND_TD3
@@ -57,6 +54,14 @@ class Line:
     low: float | None = None  # of its interval of 95 %
     high: float | None = None
     counts: str = ""  # "26 of 120 pairs"
+
+    @property
+    def shown(self) -> str:
+        """Outcome, counts and number."""
+        number = "" if self.value is None else f"{self.value:.3g}"
+        if self.low is not None and self.high is not None:
+            number += f" [{self.low:.3g}, {self.high:.3g}]"
+        return "; ".join(filter(None, (self.outcome, self.counts, number)))
 
     def stands(self, other: "Line") -> bool | None:
         """Whether the other edition says the same; None if that is not judged."""
@@ -110,13 +115,6 @@ def found() -> list[Line]:
     ]
 
 
-def first_edition(lines: Iterable[Line]) -> str:
-    """The content of `FILE`; `first` reads it."""
-    rows = [{name: one for name, one in _plain(line).items() if one not in ("", None)}
-            for line in lines]  # fmt: skip
-    return json.dumps({"commit": "be2ed13", "lines": rows}, indent=1, ensure_ascii=False) + "\n"
-
-
 @cache
 def first() -> tuple[Line, ...]:
     """The lines of the first edition."""
@@ -136,15 +134,13 @@ def parts_anew() -> Count:
     return Count(sum(map(is_anew, every)), len(every))
 
 
-def parts_table() -> str:
-    """Every published part in HTML: its edition, and when its rows were made."""
+def parts_table() -> pd.DataFrame:
+    """Every published part: its edition, and when its rows were made."""
     rows = []
     for part in dict.fromkeys(part for parts in GROUPS.values() for part in parts):
         date = published.batch_of(published.about(part[0]), part[1]).get("date", "")
-        edition = "<strong>second</strong>" if is_anew(part) else "first"
-        rows.append((escape(part[0]), escape(part[1]), edition, date))
-    header = ("File", "Part", "Edition", "Date")
-    return html_table("The parts of the published data", header, rows)
+        rows.append((*part, "second" if is_anew(part) else "first", date))
+    return pd.DataFrame(rows, columns=["file", "part", "edition", "date"]).set_index("file")
 
 
 def compared(today: Iterable[Line]) -> pd.DataFrame:
@@ -177,47 +173,32 @@ def summary(both: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=names).set_index("group")
 
 
-def summary_table(counts: pd.DataFrame) -> str:
-    """The rows of `summary` in HTML."""
-    rows = (
-        (
-            escape(str(group)),
-            f"{one.anew} of {one.parts}",
-            f"{one.standing} of {one.outcomes}" if one.outcomes else "",
-            f"{one.overlapping} of {one.numbers}" if one.numbers else "",
-        )
-        for group, one in counts.iterrows()
-    )
-    header = ("Group", "Parts made anew", "Outcomes that stand", "Intervals that overlap")
-    return html_table("What stands in both editions", header, rows, headed=True)
+def summary_table(counts: pd.DataFrame) -> pd.DataFrame:
+    """The rows of `summary` as a page shows them."""
+    pairs = {
+        "parts made anew": ("anew", "parts"),
+        "outcomes that stand": ("standing", "outcomes"),
+        "intervals that overlap": ("overlapping", "numbers"),
+    }
+    columns = {
+        name: [str(Count(*pair)) for pair in zip(counts[yes], counts[of], strict=True)]
+        for name, (yes, of) in pairs.items()
+    }
+    return pd.DataFrame(columns, counts.index).rename_axis(None).replace("0 of 0", "")
 
 
-def table(both: pd.DataFrame, group: str) -> str:
-    """The lines of a group in HTML: of the first edition, and of what is published today."""
-    rows = (
-        (
-            f"<strong>{escape(one.name)}</strong><br>{escape(one.today.text or one.first.text)}",
-            escape(one.first.expected),
-            _cell(one.first),
-            _cell(one.today),
-            {True: "yes", False: "<strong>no</strong>", None: ""}[one.stands],
-        )
+def table(both: pd.DataFrame, group: str) -> pd.DataFrame:
+    """The lines of a group: of the first edition, and of what is published today."""
+    rows = {
+        f"{one.name}. {one.today.text or one.first.text}": {
+            "expected": one.first.expected,
+            "first edition": one.first.shown,
+            "today": one.today.shown,
+            "stands": {True: "yes", False: "no"}.get(one.stands, ""),
+        }
         for one in both[both.group == group].itertuples()
-    )
-    return html_table(group, ("Outcome", "Expected", "First edition", "Today", "Stands"), rows)
-
-
-def _cell(line: Line) -> str:
-    """Outcome, counts and number of a line."""
-    style = BADGES.get(line.outcome, "")
-    word = f'<span class="{style}">{escape(line.outcome)}</span>' if style else escape(line.outcome)
-    number = ""
-    if line.value is not None:
-        form = "{:.3g}"
-        number = form.format(line.value)
-        if line.low is not None and line.high is not None:
-            number += f" [{form.format(line.low)}, {form.format(line.high)}]"
-    return "<br>".join(filter(None, (word, escape(line.counts), number)))
+    }
+    return pd.DataFrame.from_dict(rows, "index")
 
 
 # Lines of each source.
@@ -381,15 +362,6 @@ def _advice() -> list[Line]:
             for row in rows.itertuples()
         ]
     return lines
-
-
-def _plain(line: Line) -> dict[str, Any]:
-    """The fields of a line as JSON has them; numbers that are not finite as text."""
-    numbers = {name: getattr(line, name) for name in ("value", "low", "high")}
-    texts = {
-        name: str(one) for name, one in numbers.items() if one is not None and not isfinite(one)
-    }
-    return asdict(line) | texts
 
 
 def _numbers(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,8 +11,6 @@ from typing import Any
 from IPython.display import Markdown, display
 
 import nmpcrl
-from nmpcrl.claims.rule import read
-from nmpcrl.claims.verdict import Outcome
 from nmpcrl.report.cited import cited, finite, is_number
 
 ROOT = Path(nmpcrl.__file__).parents[1]
@@ -74,20 +72,6 @@ def _in_formula(found: re.Match[str]) -> bool:
     return any(before.count(sign) % 2 for sign in ("$", "`"))
 
 
-def share(value: float, digits: int = 0) -> str:
-    """A share as a sentence has it: "2.4%", "none", or "less than 0.1%" where that rounds to 0."""
-    least = 10.0 ** -(digits + 2)
-    if 0 < value < least:
-        return f"less than {least:.{digits}%}"
-    return f"{value:.{digits}%}" if value else "none"
-
-
-def held(yes: int, of: int) -> str:
-    """Whether an expectation held, by the rule for claims, as the end of a sentence."""
-    ends = ("held", "held in part", "did not hold", "cannot be decided")
-    return dict(zip(Outcome, ends, strict=True))[read(int(yes), int(of))]
-
-
 def scientific(value: float) -> str:
     """A small or large number for a formula: 3e-7 is `3 \\cdot 10^{-7}`."""
     digits, _, exponent = f"{value:e}".partition("e")
@@ -119,9 +103,9 @@ def listing(shown: Any) -> str:
     assert spec
     assert spec.origin
     text = Path(spec.origin).read_text("utf-8")
-    lines = text.splitlines()[slice(*_extent(ast.parse(text), name))]
-    path = Path(spec.origin).relative_to(ROOT).as_posix()
-    return f"`{path}`\n\n```python\n{dedent(chr(10).join(lines))}\n```"
+    first, last = _extent(ast.parse(text), name)
+    lines = dedent("\n".join(text.splitlines()[first - 1 : last]))
+    return f"`{Path(spec.origin).relative_to(ROOT).as_posix()}`\n\n```python\n{lines}\n```"
 
 
 def folded(text: str, title: str) -> str:
@@ -129,29 +113,22 @@ def folded(text: str, title: str) -> str:
     return f"<details><summary>{title}</summary>\n\n{text}\n\n</details>"
 
 
-def _extent(tree: ast.AST, name: str) -> tuple[int, int]:
-    """The lines of a definition, decorators included: the first from 0, and the one after it."""
-    outer, _, inner = name.partition(".")
-    for node in ast.iter_child_nodes(tree):
-        if outer not in _defined(node):
-            continue
-        if inner:
-            return _extent(node, inner)
-        assert isinstance(node, ast.stmt)
-        assert node.end_lineno
-        decorators = getattr(node, "decorator_list", [])
-        return min(one.lineno for one in (node, *decorators)) - 1, node.end_lineno
-    raise NameError(f"{name} is not defined there")
+def _extent(tree: Any, name: str) -> tuple[int, int]:
+    """The first and the last line of a definition, decorators included."""
+    for outer in name.split("."):
+        tree = next((one for one in tree.body if outer in _defined(one)), None)
+        if tree is None:
+            raise NameError(f"{name} is not defined there")
+    decorators = getattr(tree, "decorator_list", [])
+    return min(one.lineno for one in (tree, *decorators)), tree.end_lineno
 
 
-def _defined(node: ast.AST) -> set[str]:
+def _defined(statement: ast.stmt) -> set[str]:
     """The names that a statement gives a meaning."""
-    if isinstance(node, ast.FunctionDef | ast.ClassDef):
-        return {node.name}
-    if isinstance(node, ast.Assign | ast.AnnAssign):
-        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-        return {target.id for target in targets if isinstance(target, ast.Name)}
-    return set()
+    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+        return {statement.name}
+    names = (one for one in ast.walk(statement) if isinstance(one, ast.Name))
+    return {one.id for one in names if isinstance(one.ctx, ast.Store)}
 
 
 def _show(text: str) -> None:

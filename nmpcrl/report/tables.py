@@ -1,15 +1,17 @@
 """Verdicts, assumptions and departures as the book's pages show them: HTML and Markdown text."""
 
 import re
-from collections.abc import Iterable
-from dataclasses import fields
+from collections.abc import Iterable, Mapping
 from html import escape
 from math import isnan
 
 import pandas as pd
 
-from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.analysis.statistics import Estimate, rate
+from nmpcrl.bench.learners import ratio
 from nmpcrl.claims.assumptions import THEOREMS
+from nmpcrl.claims.investigation import WORDS as INVESTIGATED
+from nmpcrl.claims.investigation import Answer, Question
 from nmpcrl.claims.paper_claims import CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Claim, anew
 from nmpcrl.claims.verdict import (
@@ -21,11 +23,9 @@ from nmpcrl.claims.verdict import (
     Outcome,
     Verdict,
 )
-from nmpcrl.report.cited import Cited, cited
+from nmpcrl.report.cited import cited
 from nmpcrl.report.text import SURE, departure_link, listed
-from nmpcrl.report.timing import to_es
 from nmpcrl.study.departures import DEPARTURES
-from nmpcrl.study.experiment import Experiment
 
 BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
     REPRODUCED: "verdict-reproduced",
@@ -36,7 +36,7 @@ BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
 }
 PUBLISHED = "published"  # whose numbers a table shows, if nothing else is said
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
-HELD = {True: ("holds", BADGES[REPRODUCED]), False: ("does not hold", BADGES[NOT])}
+HELD = {True: ("holds", REPRODUCED), False: ("does not hold", NOT)}
 
 
 def claim_table(claims: Iterable[Claim], caption: str) -> str:
@@ -97,7 +97,7 @@ def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
         (
             _text(a.theorem),
             *("assumed" if name in a.by else "–" for name in THEOREMS),
-            f"{_badge(*HELD[a.holds])}<br>{_text(a.here)}",
+            f"{badge(*HELD[a.holds])}<br>{_text(a.here)}",
         )
         for a in assumptions
     )
@@ -115,26 +115,43 @@ TIMES = {  # columns of `time_learners` with one number each, and what one of th
 }
 
 
-def timing_table(timings: pd.DataFrame, machine: str) -> str:
-    """One row a solver and learner, in HTML: Table II, with each ratio to ES and its interval.
+def timing_table(timings: pd.DataFrame) -> pd.DataFrame:
+    """One row a solver and learner: Table II, with each ratio to ES and its interval.
 
     Args:
         timings: of `time_learners`.
-        machine: that they were timed on.
     """
-    rows = (
-        (
-            _text(f"{row['learner']} with {row['solver']}"),
-            *(
-                "–" if pd.isna(row[name]) else f"{one * row[name]:.3g}"
-                for name, (_, one) in TIMES.items()
-            ),
-            _in_two_lines(to_es(timings, row["solver"], row["learner"])),
-        )
-        for row in timings.to_dict("records")
-    )
-    header = ("step of", *(words for words, _ in TIMES.values()), "ratio")
-    return html_table(f"Times of a learning step on {machine}.", header, rows, headed=True)
+    shown = timings.set_index(["solver", "learner"])
+    columns = {name: (one * shown[of]).map("{:.3g}".format) for of, (name, one) in TIMES.items()}
+    columns["ratio"] = [str(ratio(timings, *name)) for name in shown.index]
+    return pd.DataFrame(columns).replace("nan", "–")
+
+
+def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -> pd.DataFrame:
+    """One row a question: what was asked and expected, what was found, and on what that rests.
+
+    Args:
+        answers: in the order in which they are shown.
+        questions: of an investigation, by name.
+    """
+    rows = {}
+    for one in answers:
+        asked = questions[one.question]
+        counts = [_share_of(name, *count) for name, count in one.counts.items()]
+        counts += [f"{yes} of {of} {name}" for name, (yes, of) in one.beside.items()]
+        counts += [f"{name} {number:.3g}" for name, number in one.numbers.items()]
+        rows[asked.name] = {
+            "question": f"{asked.pilot} {asked.question}".strip(),
+            "expected": INVESTIGATED.get(asked.expected, asked.expected),
+            "found": one.words,
+            "evidence": "; ".join(counts),
+        }
+    return pd.DataFrame.from_dict(rows, "index")
+
+
+def _share_of(name: str, yes: int, of: int) -> str:
+    """What was counted, with Wilson's interval as if it were independent."""
+    return f"{yes} of {of} {name}" + (f": {rate(yes, of):.0%}" if of else "")
 
 
 def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
@@ -161,18 +178,8 @@ def departure(letter: str) -> str:
     entry = DEPARTURES[letter]
     parts = {"The paper": entry.gap, "Here": entry.reading, "Why": entry.why}
     if entry.variant:
-        parts["To run it otherwise"] = _options(entry.variant.split(", "))
+        parts["To run it otherwise"] = f"Set `{entry.variant}` of an `Experiment`."
     return "\n\n".join(f"**{name}.** {text}" for name, text in parts.items())
-
-
-def _options(names: list[str]) -> str:
-    """The fields of `Experiment`, or the one value, that choose a variant, with the defaults."""
-    defaults = {field.name: field.default for field in fields(Experiment)}
-    options = dict(name.partition(" = ")[::2] for name in names)
-    shown = {name: f"{name} = {value}" if value else name for name, value in options.items()}
-    given = ", ".join(f"`{shown[name]}` (here `{defaults[name]!r}`)" for name in options)
-    first, value = next(iter(options.items()))
-    return f"Set {given}, as in `sweep({first}={value or '...'})`."
 
 
 LEFT = 'style="text-align: left"'  # the theme and Jupyter turn cells to the right
@@ -201,13 +208,14 @@ def _text(text: str) -> str:
     return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
 
 
-def _badge(text: str, style: str) -> str:
-    return f'<span class="{style}">{text}</span>'
+def badge(text: str, outcome: str) -> str:
+    """Words in the colour of an outcome."""
+    return f'<span class="{BADGES[outcome]}">{text}</span>'
 
 
 def _word(outcome: Outcome | None) -> str:
     """An outcome in a narrow cell: colour and word; nothing where nothing was judged."""
-    return _badge(WORDS[outcome], BADGES[outcome]) if outcome else ""
+    return badge(WORDS[outcome], outcome) if outcome else ""
 
 
 def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
@@ -227,12 +235,6 @@ def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
     return "".join(f"<br>{line}" for line in lines)
 
 
-def _in_two_lines(ratio: Cited) -> str:
-    """A ratio above its interval, for a narrow column."""
-    _, _, interval = str(ratio.value).partition(" ")
-    return f'{ratio:.2f}<br><span style="white-space: nowrap">{interval}</span>'
-
-
 def _outcome(verdict: Verdict, source: str = PUBLISHED) -> str:
     """What became of a claim, and the number on which that rests."""
     return f"{_labelled(verdict)}{_share(verdict, source)}"
@@ -240,7 +242,7 @@ def _outcome(verdict: Verdict, source: str = PUBLISHED) -> str:
 
 def _labelled(verdict: Verdict) -> str:
     """What is said of a claim, in the colour of those words or else of its outcome."""
-    return _badge(verdict.words, BADGES.get(verdict.words, BADGES[verdict.outcome]))
+    return badge(verdict.words, verdict.words if verdict.words in BADGES else verdict.outcome)
 
 
 def _aside(verdict: Verdict) -> str:

@@ -18,23 +18,6 @@ def measured_on(about: Mapping[str, Any]) -> str:
     return f"{machine['cores']} cores ({machine['processor']}, {about['date']})"
 
 
-def coverage(timings: pd.DataFrame) -> str:
-    """How many of the repetitions' own intervals hold what they come to together.
-
-    Args:
-        timings: of `time_learners_repeatedly`.
-    """
-    others = timings[timings.learner != learners.REFERENCE]
-    times, least = int(others.repetitions.iloc[0]), int(others.inside.min())
-    share = others.inside.sum() / others.repetitions.sum()
-    return (
-        f"The measurement was repeated {times} times, and the intervals are of how far the"
-        f" repetitions are apart. Each repetition has an interval of 95 % of its own: at least"
-        f" {least} of {times} contain the ratio of all repetitions together, for every learner and"
-        f" solver, and {share:.0%} over all."
-    )
-
-
 def to_es(timings: pd.DataFrame, solver: str, learner: str, source: str = PUBLISHED) -> Cited:
     """The measured time of a step of a learner over one of ES, with its 95 % interval.
 

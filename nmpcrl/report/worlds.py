@@ -1,6 +1,6 @@
 """Worlds that move, change, or are not the model, as a chapter shows them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -10,20 +10,14 @@ from nmpcrl import Vector
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import leaderboard
-from nmpcrl.claims.investigation import Answer
-from nmpcrl.claims.verdict import UNDECIDABLE
-from nmpcrl.report.cited import Count, cited
-from nmpcrl.report.remedies import answer_items
-from nmpcrl.report.tables import html_table
+from nmpcrl.report.cited import Count
 from nmpcrl.studies import worlds
-from nmpcrl.studies.worlds import FAULTS, WORLDS
+from nmpcrl.studies.worlds import FAULTS
 from nmpcrl.study import paper
 from nmpcrl.study.moving import CLEARANCE, Motion, centres
 
 OWN = ("oracle", "ES", "ES+model", "grid")  # policies of a wrong model that are compared
-ENTRY = {  # a policy in HTML
-    "init": "θ<sub>init</sub>", "ES": "ES", "grid": "grid over θ<sub>c</sub>", "CMA-ES": "CMA-ES"
-}  # fmt: skip
+POLICIES = ("init", "ES", "grid", "CMA-ES")
 SEES = {"known": "the motion", "extrapolated": "the velocity seen", "frozen": "the place"}
 
 
@@ -51,12 +45,6 @@ def nearest(one: Encounters, motions: Sequence[Motion]) -> Vector:
     return distances
 
 
-def answered(answers: Iterable[Answer]) -> str:
-    """The questions that published runs answer, one item each, in Markdown."""
-    there = [one for one in answers if one.outcome != UNDECIDABLE]
-    return answer_items(there, WORLDS.asked, expected=True)
-
-
 def moving(table: pd.DataFrame) -> pd.DataFrame:
     """By view and policy what is published of obstacles that move, with intervals over scenarios.
 
@@ -71,7 +59,7 @@ def moving(table: pd.DataFrame) -> pd.DataFrame:
     costs = worlds.means(table, "moving")
     met = worlds.means(table.assign(met=table.inside > 0), "moving", "met")
     found = {}
-    for view, policy in product(SEES, ENTRY):
+    for view, policy in product(SEES, POLICIES):
         arm, initial = f"{view} {policy}", costs[f"{view} init"]
         judged = there[there.arm == arm]
         judged = judged.assign(entry=arm, initial=judged.place.map(initial), episodes=0, over=False)
@@ -87,15 +75,9 @@ def moving(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame.from_dict(found, "index")
 
 
-def moving_table(found: pd.DataFrame) -> str:
-    """`moving` in HTML."""
-    header = ("Plans with", "Policy", *(name.capitalize() for name in found))
-    forms = {"cost": ".0%", "saved": ".1%", "solved": ".0%", "inside": "", "clear": ".0%"}
-    rows = (
-        (SEES[view], ENTRY[policy], *(
-            cited(f"{of[name]:{form}}".replace("-", "−"), of[name], f"{name}, {policy}, {view}")
-            for name, form in forms.items()
-        ))
-        for (view, policy), of in found.iterrows()
-    )  # fmt: skip
-    return html_table("Obstacles that move: three views by four policies.", header, rows)
+def moving_table(found: pd.DataFrame) -> pd.DataFrame:
+    """`moving` as a page shows it."""
+    forms = {"cost": "{:.0%}", "saved": "{:.1%}", "solved": "{:.0%}", "inside": "{}",
+             "clear": "{:.0%}"}  # fmt: skip
+    shown = pd.DataFrame({name: found[name].map(form.format) for name, form in forms.items()})
+    return shown.rename(index=SEES, level=0).rename_axis(["plans with", "policy"])

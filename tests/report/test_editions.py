@@ -23,7 +23,6 @@ def both():
 def test_the_first_edition_never_changes():
     text = (published.folder() / editions.FILE).read_text("utf-8")
     assert sha256(text.encode()).hexdigest() == FROZEN
-    assert editions.first_edition(editions.first()) == text
 
 
 def test_every_verdict_and_every_answer_of_the_first_edition_has_a_line():
@@ -57,8 +56,7 @@ def test_every_line_has_a_group_and_is_counted_once(both):
     assert not both.duplicated(["group", "name"]).any()
     counts = editions.summary(both)
     assert counts.outcomes.sum() == sum(bool(one.outcome) for one in editions.first())
-    pages = "".join(editions.table(both, group) for group in editions.GROUPS)
-    assert pages.count("<tr>") == len(both) + len(editions.GROUPS)
+    assert sum(len(editions.table(both, group)) for group in editions.GROUPS) == len(both)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What figures draw is what was computed: bars are counts, no run is lost, intervals are Wilson's."""
+"""What figures draw is what was computed: bars are counts, and no run is lost."""
 
 import numpy as np
 import pandas as pd

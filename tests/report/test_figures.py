@@ -48,7 +48,7 @@ from nmpcrl.report.figures import (
 )
 from nmpcrl.report.figures.run import run_page
 from nmpcrl.report.trace import trace
-from nmpcrl.studies import difficulty, other_problems
+from nmpcrl.studies import other_problems
 from nmpcrl.studies import population as drawn
 from nmpcrl.studies import remedies as advice
 from nmpcrl.studies import worlds as changing
@@ -61,10 +61,12 @@ WAY = np.linspace(paper.START, paper.TARGET, paper.STEPS + 1)
 FAILS = WAY[:15].repeat(3, axis=0)
 GRID, ANGLE = np.linspace(0.0, 0.8, 5), np.linspace(-1, 1, 5)
 KINDS = pd.Series([0.02, 0.03, 0.04])
-SAVED = pd.DataFrame({"oracle": KINDS - 0.035, "ES": KINDS, "ES+model": KINDS, "grid": KINDS + 0.03})
+SAVED = pd.DataFrame(
+    {"oracle": KINDS - 0.035, "ES": KINDS, "ES+model": KINDS, "grid": KINDS + 0.03}
+)
 OPEN = Stand(0, 0.001, np.nan, WAY, 4000.0, True, 0.0, 0.1, 0.1, 0.0)
-STANDS = [OPEN, *[replace(OPEN, episode=k, theta_c=k / 10, arrived=False, stage_cost=30.0, value=900.0)
-                  for k in (4, 8, 12)]]  # fmt: skip
+STUCK = replace(OPEN, arrived=False, stage_cost=30.0, value=900.0)
+STANDS = [OPEN, *(replace(STUCK, episode=k, theta_c=k / 10) for k in (4, 8, 12))]
 
 
 nmpc, whole, population_of = cache(paper.nmpc), cache(published.load), cache(drawn.load)
@@ -118,7 +120,8 @@ def predicted() -> object:
     return population.predictors(scores, es, at_the_gap(known).closes, "It tells")
 
 
-JUDGED = [Judgement(100.0, cost, cost < 100, episodes, 0.1) for cost, episodes in ((95, 5), (150, 10))]
+JUDGED = [Judgement(100.0, cost, cost < 100, 5, 0.1) for cost in (95.0, 150.0)]
+LAYOUTS = dict.fromkeys("ABCDEF", 0.3)
 MANY = Curvature(np.arange(9), np.ones(9), np.full(9, 0.01))
 RUN = Experiment(**SMALL)
 FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is called
@@ -183,11 +186,11 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
     layouts.verdict_map: lambda draw: draw(
         robustness_map(made().runs, made().paths), "Some change", "made up"
     ),
-    population.shares: lambda draw: draw(population_of().shares, population_of().shares, "It holds"),
+    population.shares: lambda draw: draw(*[population_of().shares] * 2, "It holds"),
     population.predictors: lambda draw: predicted(),
     trap.trap: lambda draw: draw(paper.task("E"), STANDS, (0, 1, 3), "It stands"),
     trap.cliffs: lambda draw: draw(
-        GRID, dict.fromkeys("ABCDEF", (4000 + GRID, 4100 + GRID)), dict.fromkeys("ABCDEF", 0.3), "Up"
+        GRID, dict.fromkeys(LAYOUTS, (4000 + GRID, 4100 + GRID)), LAYOUTS, "Up"
     ),
     remedies.gains: lambda draw: draw(advice.advice(advice.REMEDIES.table()), "It gains"),
     remedies.by_budget: lambda draw: draw([5, 10], {"ES": JUDGED, "grid": JUDGED}),
@@ -195,7 +198,7 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
         {name: dict.fromkeys(remedies.WAYS, WAY) | {"init": FAILS} for name in paper.LAYOUTS}
     ),
     worlds.models: lambda draw: draw(report.saved(changing.WORLDS.table())),
-    worlds.shifts: lambda draw: draw({arm: [np.linspace(1, 0.9, 60)] * 4 for arm in worlds.ARMS}, 150),
+    worlds.shifts: lambda draw: draw(dict.fromkeys(worlds.ARMS, [np.ones(60)] * 4), 150),
     worlds.views: lambda draw: draw(
         (Straight((3.0, 3.0), (0.0, -0.1)), Straight((5.0, 1.0), (0.1, 0.0))),
         {view: Encounters(WAY, 4000.0, Contacts(7, 1), True) for view in worlds.SEEN},
@@ -223,7 +226,9 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("draw", FIGURES, ids=lambda draw: f"{draw.__module__.split('.')[-1]}.{draw.__name__}")
+@pytest.mark.parametrize(
+    "draw", FIGURES, ids=lambda draw: f"{draw.__module__.split('.')[-1]}.{draw.__name__}"
+)
 def test_a_figure_can_be_read_on_a_page(draw):
     figure = FIGURES[draw](draw)
     assert figure.get_size_inches()[0] == style.WIDTH
@@ -271,5 +276,7 @@ def test_a_notebook_is_shown_one_picture_and_its_finding(monkeypatch):
     figure._ipython_display_()
     monkeypatch.setattr(style, "HEAVY", 0)
     figure._ipython_display_()
-    assert [{*one} for one in shown] == [{"text/plain", f"image/{kind}"} for kind in ("svg+xml", "png")]
+    assert [{*one} for one in shown] == [
+        {"text/plain", f"image/{kind}"} for kind in ("svg+xml", "png")
+    ]
     assert shown[0]["text/plain"] == "theta_x grows"

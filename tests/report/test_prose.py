@@ -14,10 +14,8 @@ from nmpcrl.report import prose
 from nmpcrl.report.cited import Count, by_reading
 from nmpcrl.report.prose import (
     filled,
-    held,
     listing,
     say,
-    share,
     source,
 )
 
@@ -34,35 +32,6 @@ def test_of_other_runs_one_line_stands_in_the_place_of_an_interpretation(when, s
     monkeypatch.setattr(prose, "_show", shown.append)
     say("It fell by {fall} %.", when=when, fall=3)
     assert shown == [said]
-
-
-@pytest.mark.parametrize(
-    ("value", "digits", "said"),
-    [
-        (0.0, 0, "none"),
-        (0.004, 0, "less than 1%"),
-        (0.004, 1, "0.4%"),
-        (0.0004, 1, "less than 0.1%"),
-        (0.126, 0, "13%"),
-        (1.0, 1, "100.0%"),
-        (-0.5, 0, "-50%"),
-    ],
-)
-def test_a_share_that_is_not_nothing_is_not_written_as_0(value, digits, said):
-    assert share(value, digits) == said
-
-
-@pytest.mark.parametrize(
-    ("yes", "of", "said"),
-    [
-        (6, 6, "held"),
-        (20, 40, "held in part"),
-        (20, 480, "did not hold"),
-        (2, 2, "cannot be decided"),
-    ],
-)
-def test_an_expectation_held_by_the_rule_for_claims(yes, of, said):
-    assert held(yes, of) == said
 
 
 @given(before=WORDS, after=WORDS, number=st.floats(allow_nan=False, allow_infinity=False))

@@ -1,21 +1,30 @@
-"""What pages show of verdicts, assumptions and departures."""
+"""What pages show of verdicts, questions, methods and times: tables follow from their rows."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import pytest
 from bs4 import BeautifulSoup
 
-from nmpcrl.claims.verdict import (
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    UNDECIDABLE,
-    Verdict,
-)
-from nmpcrl.report import tables
+from nmpcrl.analysis.encounters import Contacts, Encounters
+from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.claims.investigation import Answer
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.report import agents, remedies, tables, timing, worlds
+from nmpcrl.report.drawn import at_the_gap, improve_by_gap, share_table
 from nmpcrl.report.text import departure_link
+from nmpcrl.studies.agents import SAC_AND_TD3, course
+from nmpcrl.studies.difficulty import OPEN
+from nmpcrl.studies.population import Drawn, shares
+from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, REMEDIES, RemedyRow
+from nmpcrl.studies.worlds import ORACLES, VIEWS
+from nmpcrl.study import paper
+from nmpcrl.study.drawn import JUDGE
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.moving import still
+
+SHORT, LONG = ADVISED
 
 
 def verdict(outcome: str, **judged) -> Verdict:
@@ -28,60 +37,194 @@ def cells(table: str) -> list[list[str]]:
     return [[cell.get_text("|") for cell in row.find_all(["th", "td"])] for row in rows]
 
 
-def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
-    shares = {"share": 0.75, "interval": (0.5, 0.875)}
-    judged = cells(tables.verdict_table([verdict(PARTLY, **shares), verdict(NOT)], "All of it."))
-    assert [row[1] for row in judged[1:]] == [f"{PARTLY}|75% [50%, 88%]", NOT]
+# Claims
 
 
-def test_the_verdicts_of_other_runs_have_a_column_of_their_own():
+def test_a_verdict_shows_its_share_and_interval_beside_that_of_other_runs():
     known, own = verdict(NOT), verdict(PARTLY, share=0.75, interval=(0.5, 0.875))
     header, row = cells(tables.verdict_table([known], "All of it.", [own]))
     assert header == ["The paper claims", "Published", "Runs of this page"]
     assert row[1:] == [NOT, f"{PARTLY}|75% [50%, 88%]"]
+    assert cells(tables.verdict_table([own], ""))[1][1] == row[2]
+    assert "a &lt; b &amp; c." in tables.verdict_table([own], "<caption>")
+    assert "&lt;caption&gt;" in tables.verdict_table([], "<caption>")
 
 
-def test_a_timing_shows_each_ratio_with_its_interval_and_a_dash_for_no_number():
-    numbers = dict.fromkeys(tables.TIMES, 1.2345) | {"ms_per_fit": np.nan}
-    ratio = {"ratio": 0.6349, "ratio_low": 0.6251, "ratio_high": 0.641, "waited": 0.2}
-    timings = pd.DataFrame([{"solver": "ipopt", "learner": "RDES", **numbers, **ratio}])
-    shown = tables.timing_table(timings, "2 cores (Abacus 9)")
-    assert "Times of a learning step on 2 cores (Abacus 9)." in shown
-    assert '<th scope="row"' in shown  # stays in sight where the table scrolls
-    header, row = cells(shown)
-    assert dict(zip(header, row, strict=True)) == {
-        "step of": "RDES with ipopt",
-        **{words: f"{1.2345 * one:.3g}" for words, one in tables.TIMES.values()},
-        "ms per fit": "–",
-        "ratio": "0.63|[0.63, 0.64]",
-    }
-
-
-def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
+def test_a_claim_is_shown_in_each_layout_and_decay_in_colour_and_in_words():
     parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
     table = tables.layout_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
     assert cells(table) == [
         ["Claim", "All", "A", "B", "per step"],
         ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
     ]
-    for outcome in (PARTLY, *parts["by_layout"].values(), UNDECIDABLE):
+    for outcome in (PARTLY, REPRODUCED, NOT, UNDECIDABLE):
         assert f'<span class="{tables.BADGES[outcome]}">{tables.WORDS[outcome]}</span>' in table
-    assert '<th scope="row"' in table
 
 
 def test_what_changes_a_verdict_is_named_by_departure_and_bold_where_it_is_sure():
-    changed = pd.DataFrame(
-        [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)],
-        columns=["departure", "variant", "claim", "p"],
-    )
-    table = tables.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], changed)
-    first, second = table.splitlines()[2:]
+    rows = [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)]
+    changed = pd.DataFrame(rows, columns=["departure", "variant", "claim", "p"])
+    row = tables.dependence([verdict(PARTLY)], changed).splitlines()[-1]
     by = f"{departure_link('B', 'B')}: **layout E** and layout F<br>no assumption of ours: N = 5"
-    badge = '<span class="{}">{}</span>'
-    assert first.endswith(f" | {badge.format(tables.BADGES[PARTLY], 'partly')} | {by} |")
-    assert second.endswith(f" | {badge.format(tables.BADGES[NOT], 'no')} | nothing |")
+    assert row.endswith(f"partly</span> | {by} |")
+    assert tables.dependence([verdict(NOT)], changed[:0]).endswith("no</span> | nothing |")
 
 
-def test_what_a_claim_says_cannot_break_the_page():
-    assert "a &lt; b &amp; c." in tables.verdict_table([verdict(NOT)], "<caption>")
-    assert "&lt;caption&gt;" in tables.verdict_table([], "<caption>")
+def test_a_drawn_claim_has_count_interval_outcome_and_what_was_expected():
+    rows = [("ES improves", f"J{i:03}", 1, 2, i < 38, i < 39) for i in range(40)]
+    held = ["claim", "layout", "yes", "of", "holds", "weaker"]
+    row = share_table(shares(pd.DataFrame(rows, columns=held))).loc["ES improves"]
+    assert [*row] == ["38 of 40: 95% [83%, 99%]", "39 of 40", REPRODUCED, "85% to 97%"]
+
+
+def test_runs_are_split_by_whether_theta_c_has_closed_a_gap_where_there_is_one(made_up):
+    names = ["J001", "J002", "J003"]
+    found = made_up(layouts=tuple(JUDGE[name] for name in names), seeds=(0,))
+    runs = found.runs.assign(part="judge", theta_8=0.2, distance=0.0)
+    costs = {
+        Experiment(layout=JUDGE[name]).layout: cost
+        for name, cost in zip(names, (0.9, 0.995, 1.1), strict=True)
+    }
+    runs["final_cost"] = runs.initial_cost * [costs[layout] for layout in runs.layout]
+    closes = pd.DataFrame({"closes": {"J001": 0.3, "J002": 0.1, "J003": OPEN}})
+    each = len(runs[runs.learner == "ES"]) // 3
+    counts = improve_by_gap(at_the_gap(Drawn(runs, {}, closes)))
+    assert counts == {"open": (each, each), "closed": (0, each)}
+
+
+# Questions, methods and times
+
+
+@pytest.mark.parametrize(
+    ("answer", "shown"),
+    [
+        (Answer(REPRODUCED, {"layouts": (14, 15)}, question="guard"),
+         ["confirmed", "14 of 15 layouts: 93% [70%, 99%]"]),
+        (Answer(NOT, {"layouts": (0, 0)}, {"difference": -0.1, "low": -np.inf}, {"all": (1, 2)},
+                question="guard"),
+         ["contradicted", "0 of 0 layouts; 1 of 2 all; difference -0.1; low -inf"]),
+    ],
+)  # fmt: skip
+def test_an_answer_comes_with_its_question_its_evidence_and_what_was_expected(answer, shown):
+    asked, row = REMEDIES.asked["guard"], tables.answer_table([answer], REMEDIES.asked).loc["guard"]
+    assert [*row] == [f"{asked.pilot} {asked.question}".strip(), "confirmed", *shown]
+
+
+def advised(entry, word, part=SHORT, gain=(0.8, 0.7, 0.9), share=0.9, setting=""):
+    solved = Estimate(share, 0.8, 0.95)
+    made = RemedyRow(part, entry, entry + setting, Estimate(*gain), solved, 120, 2, 49, 0.54, False)
+    return made._asdict() | {"word": word, "tuning": 3000}
+
+
+ADVICE = pd.DataFrame(
+    [
+        advised("CMA-ES", FIRST, setting="[spread=0.1]"),
+        advised("CMA-ES", FIRST, LONG, (0.99, 0.98, 1.0)),
+        advised("DPG", NEVER, gain=(-np.inf, -np.inf, -0.2), share=1.0),
+    ]
+)
+
+
+def test_a_method_has_its_word_its_evidence_and_its_price_by_budget():
+    head, first, last = cells(remedies.advice_table(ADVICE, "All."))
+    assert len(head) == len(first) == len(last)
+    assert first[0] == "`CMA-ES|[spread=0.1]`"
+    assert first[1].startswith(f"{FIRST}|a search of all nine numbers by CMA-ES")
+    assert first[2] == "0.80 [0.70, 0.90]|90% [80%, 95%]| of 120 layouts; 49 rollouts, 0.5 s"
+    assert first[3].startswith("0.99 [0.98, 1.00]|")
+    assert last[2].startswith("-∞ [-∞, -0.20]|")
+    assert last[3] == "–"
+
+
+def test_the_evidence_of_a_method_is_that_with_the_smaller_budget():
+    found = remedies.evidence(ADVICE, "CMA-ES")
+    assert f"{found['gain'].value:.2f}" == "0.80 [0.70, 0.90]"
+    assert found["solved"].value.value == pytest.approx(0.9)
+    assert remedies.safest(ADVICE) == ["DPG"]
+
+
+def test_a_part_has_each_layout_the_greatest_share_first_and_a_star_where_one_is_unsolved():
+    part = PARTS["named 50"]
+    rows = [
+        {"part": "named 50", "entry": entry, "arm": entry, "place": layout, "k": k,
+         "initial": 100.0, "best": 80.0, "cost": cost, "arrived": cost < 90, "episodes": 50,
+         "over": False, "seconds": 0.5}
+        for entry, cost in (("ES", 110.0), ("SPSA", 84.0))
+        for layout in part.places
+        for k in range(part.seeds)
+    ]  # fmt: skip
+    shown = remedies.named_table(pd.DataFrame(rows), "named 50")
+    assert [*shown.columns] == [*"ABCDEF", "solved", "CPU time [s]"]
+    assert [*shown.index] == ["SPSA", "ES"]
+    assert [*shown.loc["SPSA"]] == [*["0.80"] * 6, "6 of 6", "0.5"]
+    assert [*shown.loc["ES"]] == [*["-0.50*"] * 6, "0 of 6", "0.5"]
+
+
+def test_the_numbers_of_an_agent_are_those_of_its_course_and_of_the_questions():
+    table, suite = SAC_AND_TD3.table(), REMEDIES.table()
+    costs, counts = agents.costs(table, suite), agents.counts(table, suite)
+    for name in ("SAC", "TD3"):
+        assert costs[name].value.value == course(table, "judge", name).median[-1]
+        answer = SAC_AND_TD3.answers(table)[f"{name} matches in 300 episodes"]
+        assert counts[answer.question].value == next(iter(answer.counts.values()))
+    assert agents.seconds(table)["SAC"] > 1
+
+
+def test_a_ratio_of_times_has_its_interval_and_carries_what_it_is_of(timings):
+    shown = str(timing.to_es(timings, "ipopt", "RDES"))
+    row = timings.set_index(["solver", "learner"]).loc["ipopt", "RDES"]
+    interval = f"{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
+    assert f">{interval}</data>" in shown
+    assert 'title="step of RDES in steps of ES, with ipopt: the published measurement"' in shown
+    table = tables.timing_table(timings)
+    assert table.ratio["ipopt", "RDES"] == interval
+    assert table["ms per fit"]["ipopt", "ES"] == "–"
+    with pytest.raises(KeyError):
+        timing.to_es(timings, "scipy", "RDES")
+
+
+def test_slow_solves_give_one_half_only_where_all_take_alike(timings):
+    timings.loc[timings.learner == "ES", "ms_per_solve"] *= 0.8
+    alike, warm = timing.ratios_at_paper_speed(timings)
+    assert (alike, warm) == (pytest.approx(0.5, abs=0.005), pytest.approx(0.63, abs=0.005))
+
+
+# Worlds that change
+
+
+def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a_lag():
+    costs = {f"{fault} {how}": cost for fault in (*ORACLES, "lag")
+             for how, cost in {"init": 100.0, "oracle": 95.0, "ES": 95.0, "grid": 90.0}.items()
+             if (fault, how) != ("lag", "oracle")}  # fmt: skip
+    rows = [{"part": "model", "arm": arm, "place": place, "cost": cost * size}
+            for arm, cost in costs.items() for place, size in (("J001", 1), ("J002", 2))
+            if "grid" not in arm or place == "J001"]  # fmt: skip
+    found = worlds.saved(pd.DataFrame(rows))
+    assert [*found.index.unique(0)] == [*ORACLES, "lag"]  # noise has no rows
+    assert found.oracle["lag"].isna().all()
+    assert found.grid["speed"].dropna().to_dict() == pytest.approx({"J001": 0.1})
+    assert found.ES["lag"].tolist() == pytest.approx([0.05, 0.05])
+
+
+def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_not_touch():
+    one = Encounters(np.zeros((paper.STEPS + 1, 3)), 0.0, Contacts(0, 0), arrived=False)
+    assert worlds.deepest(one, still([(3.0, 0.0), (1.0, 0.0)])) == pytest.approx(0.25)
+    assert worlds.deepest(one, still([(3.0, 0.0)])) == 0
+
+
+def test_the_table_of_moving_obstacles_has_a_row_of_each_view_and_policy():
+    runs = [
+        {"part": "moving", "arm": f"{view} {policy}", "place": place, "k": k, "cost": cost,
+         "arrived": True, "inside": k * (policy == "ES"), "seconds": 1.0}
+        for view in VIEWS
+        for policy, cost in zip(worlds.POLICIES, (100.0, 90.0, 95.0, 80.0), strict=True)
+        for place in ("M01", "M02")
+        for k in range(3 if policy == "ES" else 1)
+    ]  # fmt: skip
+    found = worlds.moving(pd.DataFrame(runs))
+    of = found.loc[("extrapolated", "ES")]
+    assert (of.cost.value, of.saved.value) == (pytest.approx(0.9), pytest.approx(0.1))
+    assert (of.solved.value, of.clear.value, of.inside) == (1, 0, (2, 2))
+    shown = worlds.moving_table(found)
+    assert len(shown) == len(VIEWS) * len(worlds.POLICIES)
+    assert shown.loc["the velocity seen", "ES"].inside == "2 of 2"

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.control import Task
 from nmpcrl.report.figures.style import (
     BAND,
@@ -96,8 +96,9 @@ def over_episodes(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
 
 def each_episode(axes: Axes, values: Vector, **look: Any) -> None:
     """One value an episode, from episode 1 on; a single one is a point."""
-    mark = {"marker": "o", "markersize": 4} if np.isfinite(values).sum() == 1 else {}
-    axes.plot(np.arange(1, len(values) + 1), values, **(mark | look))
+    mark: dict[str, Any] = {"marker": "o", "markersize": 4}
+    alone = np.isfinite(values).sum() == 1
+    axes.plot(np.arange(1, len(values) + 1), values, **((mark if alone else {}) | look))
 
 
 def by_decay(
@@ -196,7 +197,8 @@ def legend(figure: Drawn, learners: Iterable[str], *others: Line2D) -> None:
 def interval(axes: Axes, y: float, estimate: Any, **look: Any) -> None:
     """A point with its interval of 95 %, at a height; `estimate` has value, low and high."""
     axes.hlines(y, estimate.low, estimate.high, color=look["color"], linewidth=1.6)
-    axes.plot(estimate.value, y, **({"marker": "o", "markersize": 5, "linestyle": ""} | look))
+    point: dict[str, Any] = {"marker": "o", "markersize": 5, "linestyle": ""}
+    axes.plot(estimate.value, y, **(point | look))
 
 
 def stacked(
@@ -211,7 +213,7 @@ def stacked(
 
 
 def middle_half(
-    axes: Axes, along: Vector, runs: Matrix, color: str, method: str = "linear", **look: Any
+    axes: Axes, along: Any, runs: Any, color: str, method: str = "linear", **look: Any
 ) -> None:
     """The median of some runs, shape (runs, points), and a band from quartile to quartile."""
     low, median, high = np.nanquantile(runs, (0.25, 0.5, 0.75), axis=0, method=method)  # type: ignore[call-overload]

@@ -252,7 +252,7 @@ def _shares(axes: Axes, verdict: Verdict) -> None:
 
 def _scatter(axes: Axes, pairs: pd.DataFrame, decay: str) -> None:
     """A mark a pair of one decay, in a panel that has room for both; its shape is the layout."""
-    box = {"facecolor": "0.88", "edgecolor": INK}
+    box: dict[str, Any] = {"facecolor": "0.88", "edgecolor": INK}
     axes.add_patch(Rectangle((0, 0), thresholds.SAME_PATH, thresholds.SAME_COST, **box))
     across = logarithmic(axes, "x", pairs.path.to_numpy(float), thresholds.SAME_PATH)
     up = logarithmic(axes, "y", pairs.cost.to_numpy(float), thresholds.SAME_COST)
@@ -277,9 +277,7 @@ def _counts(axes: Axes, runs: pd.DataFrame, column: str) -> None:
             counts = runs[f"{column}_{size}"][runs.learner == name].to_numpy(float)
             at = i + x + jitter(counts.size, 0.1)
             axes.plot(at, counts, mark, color=color, markersize=2.5)
-            axes.text(
-                i + x, 0.99, f"{counts.sum():.0f}", ha="center", va="top", rotation=90, **above
-            )
+            axes.text(i + x, 0.99, f"{counts.sum():.0f}", **above)
     axes.set_yscale("symlog", linthresh=1)
     axes.set_xticks(range(len(names)), names)
 

@@ -124,9 +124,8 @@ def theta_effects(
         axes.set_title(" ".join(MEANINGS[name]))
     bottom, top = axes.get_ylim()
     axes.set_ylim(bottom - 1, top)
-    first, second, *_ = (
-        "{} ({})".format(*MEANINGS[one]) for one in sorted(moved, key=moved.get)[::-1]
-    )
+    first, second, *_ = sorted(moved, key=lambda name: -moved[name])
+    most = " and ".join("{} ({})".format(*MEANINGS[name]) for name in (first, second))
     return titled(figure, f"{most} bend the trajectory most")
 
 

@@ -84,7 +84,7 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Drawn:
             episodes = np.unique(run.episode)
             squares = (prediction - run.value) ** 2
             error = [np.sqrt(squares[run.episode == one].mean()) for one in episodes]
-            look = LOOKS[learner].dots(lw=1.2, ms=3.5) | LOOKS[learner].line
+            look = LOOKS[learner].dots(lw=1.2, markersize=3.5) | LOOKS[learner].line
             axes.semilogy(episodes + 1, error, label=f"input {inputs}" if k == 0 else None, **look)
     over_episodes(axes, xlabel="held-out episode")
     axes.set_ylabel("error of the network [cost]")

@@ -263,7 +263,9 @@ def by_layout(
     for layout, axes in in_layout.items():
         for x, learner in enumerate(learners):
             here = (runs.layout == layout) & (runs.learner == learner) & values.notna()
-            _strip(axes, x, LOOKS[learner].dots(ms=3.5), runs[here], values[here].clip(*seen))
+            _strip(
+                axes, x, LOOKS[learner].dots(markersize=3.5), runs[here], values[here].clip(*seen)
+            )
         axes.axhline(0, **LIMIT)
         axes.set_title(layout)
         axes.set_xticks(range(len(learners)), learners, rotation=90, fontsize="small")
