@@ -1,4 +1,4 @@
-"""Verdicts, assumptions and departures as the book's pages show them: HTML and Markdown text."""
+"""Claims, verdicts, questions, departures and times as pages show them: tables."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -24,7 +24,7 @@ from nmpcrl.claims.verdict import (
     Verdict,
 )
 from nmpcrl.report.cited import cited
-from nmpcrl.report.text import SURE, departure_link, listed
+from nmpcrl.report.text import SURE, departure_link
 from nmpcrl.study.departures import DEPARTURES
 
 BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
@@ -36,20 +36,19 @@ BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
 }
 PUBLISHED = "published"  # whose numbers a table shows, if nothing else is said
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
-HELD = {True: ("holds", REPRODUCED), False: ("does not hold", NOT)}
 
 
-def claim_table(claims: Iterable[Claim], caption: str) -> str:
-    """One row a claim, in HTML: what will be asked of each run, and how it will be decided."""
-    rows = (
-        (
-            f"<strong>{_text(c.name)}</strong> {_text(c.statement)}",
-            f"{_text(c.question)}<br>{_text(_sentence(c.measured))}",
-            f"{_text(_sentence(c.border))}<br>{_text(_sentence(c.test))}",
-        )
+def claim_table(claims: Iterable[Claim]) -> pd.DataFrame:
+    """One row a claim: what will be asked of each run, and how it will be decided."""
+    rows = {
+        c.name: {
+            "claim": c.statement,
+            "what is asked and measured": f"{c.question} {_sentence(c.measured)}",
+            "threshold and test": f"{_sentence(c.border)} {_sentence(c.test)}",
+        }
         for c in claims
-    )
-    return html_table(caption, ("Claim", "What is asked and measured", "Threshold and test"), rows)
+    }
+    return pd.DataFrame.from_dict(rows, "index")
 
 
 def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verdict] = ()) -> str:
@@ -91,17 +90,14 @@ def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
     return html_table(caption, header, rows, headed=True)
 
 
-def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
-    """One row an assumption, in HTML: which theorem makes it, and what is run."""
-    rows = (
-        (
-            _text(a.theorem),
-            *("assumed" if name in a.by else "–" for name in THEOREMS),
-            f"{badge(*HELD[a.holds])}<br>{_text(a.here)}",
-        )
+def assumption_table(assumptions: Iterable[Assumption]) -> pd.DataFrame:
+    """One row an assumption: which theorem makes it, and what is run."""
+    rows = {
+        a.theorem: {name: "assumed" if name in a.by else "–" for name in THEOREMS}
+        | {"holds": "yes" if a.holds else "no", "here": a.here}
         for a in assumptions
-    )
-    return html_table(caption, ("Assumption", *THEOREMS, "Here"), rows)
+    }
+    return pd.DataFrame.from_dict(rows, "index")
 
 
 TIMES = {  # columns of `time_learners` with one number each, and what one of their units is
@@ -154,23 +150,20 @@ def _share_of(name: str, yes: int, of: int) -> str:
     return f"{yes} of {of} {name}" + (f": {rate(yes, of):.0%}" if of else "")
 
 
-def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
-    """One row a claim, in Markdown: its verdict, and what changes it, by departure.
+def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> pd.DataFrame:
+    """One row a claim: its verdict, and what changes it, by the letter of our assumption.
 
     Args:
         verdicts: of `rule.judge`.
-        changed: rows of `robustness_map`; those that chance hardly explains, by `SURE`, are bold.
+        changed: rows of `robustness_map`; a star marks those that are more than chance, by `SURE`.
     """
-    rows = ["| Claim | Over all | Changed by |", "|---|---|---|"]
+    names = changed.variant.where(~(changed.p < SURE), changed.variant + "*")
+    rows = {}
     for v in verdicts:
-        mine = changed[changed.claim == v.claim]
-        by = [
-            f"{_letter(str(letter))}: {listed(map(_weighed, group.variant, group.p))}"
-            for letter, group in mine.groupby("departure", sort=False)
-        ]
-        outcome = f"{_word(v.outcome)}{_share(v)}"
-        rows.append(f"| **{v.claim}** {v.statement} | {outcome} | {'<br>'.join(by) or 'nothing'} |")
-    return "\n".join(rows)
+        mine = names[changed.claim == v.claim].groupby(changed.departure, sort=False).agg(", ".join)
+        by = [f"{letter or 'no assumption'}: {each}" for letter, each in mine.items()]
+        rows[v.claim] = {"claim": v.statement, "verdict": v.words, "changed by": "; ".join(by)}
+    return pd.DataFrame.from_dict(rows, "index")
 
 
 def departure(letter: str) -> str:
@@ -251,15 +244,6 @@ def _aside(verdict: Verdict) -> str:
         return f"<em>Wider than {WIDER_THAN[verdict.claim]}:</em> "
     implied = verdict.claim in CLAIMS and CLAIMS[verdict.claim].implied
     return "<em>Implied:</em> " if implied else ""
-
-
-def _letter(letter: str) -> str:
-    """A link to an assumption of ours; the paper is clear about what has none."""
-    return departure_link(letter, letter) if letter else "no assumption of ours"
-
-
-def _weighed(variant: str, p: float) -> str:
-    return f"**{variant}**" if p < SURE else variant
 
 
 def _sentence(text: str) -> str:

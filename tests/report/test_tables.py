@@ -13,7 +13,6 @@ from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.report import agents, remedies, tables, timing, worlds
 from nmpcrl.report.drawn import at_the_gap, improve_by_gap, share_table
-from nmpcrl.report.text import departure_link
 from nmpcrl.studies.agents import SAC_AND_TD3, course
 from nmpcrl.studies.difficulty import OPEN
 from nmpcrl.studies.population import Drawn, shares
@@ -61,13 +60,13 @@ def test_a_claim_is_shown_in_each_layout_and_decay_in_colour_and_in_words():
         assert f'<span class="{tables.BADGES[outcome]}">{tables.WORDS[outcome]}</span>' in table
 
 
-def test_what_changes_a_verdict_is_named_by_departure_and_bold_where_it_is_sure():
+def test_what_changes_a_verdict_is_named_by_departure_with_a_star_where_it_is_sure():
     rows = [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)]
     changed = pd.DataFrame(rows, columns=["departure", "variant", "claim", "p"])
-    row = tables.dependence([verdict(PARTLY)], changed).splitlines()[-1]
-    by = f"{departure_link('B', 'B')}: **layout E** and layout F<br>no assumption of ours: N = 5"
-    assert row.endswith(f"partly</span> | {by} |")
-    assert tables.dependence([verdict(NOT)], changed[:0]).endswith("no</span> | nothing |")
+    row = tables.dependence([verdict(PARTLY)], changed).loc["C1"]
+    by = "B: layout E*, layout F; no assumption: N = 5"
+    assert [*row] == ["a < b & c.", PARTLY, by]
+    assert tables.dependence([verdict(NOT)], changed[:0]).loc["C1", "changed by"] == ""
 
 
 def test_a_drawn_claim_has_count_interval_outcome_and_what_was_expected():

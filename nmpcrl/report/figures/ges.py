@@ -62,7 +62,7 @@ def correction_shares(records: Records) -> Vector:
 @page
 def corrections(runs: Runs[Records]) -> Drawn:
     """Corrections beside semi-gradients in each episode of GES, one panel a decay."""
-    label = "correction / semi-gradient (no unit)"
+    label = "correction /\nsemi-gradient (no unit)"
     figure, panels = by_decay(runs, ("GES",), correction_shares, label, 3.0)
     panels[0].set_ylim(0, None)
     for axes in panels:

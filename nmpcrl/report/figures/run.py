@@ -51,7 +51,7 @@ def run_page(records: Records, frozen: Records | None = None) -> Drawn:
         each_episode(panels["noisy"], metrics.training_cost(one), **look)
         episode, judged = metrics.noise_free_cost(one)
         known = np.isfinite(judged)
-        panels["noise-free"].plot(episode[known], judged[known], ".", ls="-", **look)
+        panels["noise-free"].plot(episode[known], judged[known], marker=".", **look)
     panels["noisy"].legend(fontsize="small")
     for name, label in (("noisy", "cost with noise"), ("noise-free", "cost without noise")):
         logarithmic_if_wide(panels[name])

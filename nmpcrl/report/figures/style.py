@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
 from io import BytesIO
+from textwrap import fill
 from typing import Any, ParamSpec
 
 import numpy as np
@@ -13,6 +14,7 @@ from IPython.display import display
 from matplotlib import colormaps, rc_context
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 
 PAGE: dict[Any, Any] = {
     "axes.spines.right": False,
@@ -86,13 +88,17 @@ def titled(figure: Drawn, title: str, source: str = "") -> Drawn:
     """The figure with its finding above, on as many lines as it takes, and its runs' source below.
 
     Args:
-        figure: all panels.
+        figure: all panels, and the legend below them.
         title: the finding.
-        source: where the runs come from.
+        source: where the runs come from; it heads the legend, if there is one.
     """
     unbroken = re.sub(r"\$.*?\$", lambda math: math[0].replace(" ", "{}"), title)
     figure.suptitle(unbroken, x=0.01, ha="left", wrap=True)
-    if source:
+    if figure.legends:
+        legend = figure.legends[0]
+        legend.set_title(fill(source, 78), prop=FontProperties(size="small"))
+        legend.get_title().set_color("0.35")
+    elif source:
         figure.supxlabel(source, x=0.99, ha="right", fontsize="small", color="0.35", wrap=True)
     return figure
 
