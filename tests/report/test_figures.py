@@ -155,7 +155,7 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
         tuple(dropped_curvature(one, samples=10) for one in list(runs("ES", "GES").values())[2:3])
     ),
     ges.parts_of_tdc: lambda draw: draw(
-        {name: summary_of(Experiment("TDC"), w=np.full((300, 9), 0.01)) for name in ges.PARTS}
+        {name: summary_of(Experiment("TDC")) for name in ges.PARTS}
     ),
     results.learning_curves: lambda draw: draw(
         made(), ("DES", "RDES"), "A", thresholds.divergence, "diverged"

@@ -30,6 +30,7 @@ from nmpcrl.study import Runs
 from nmpcrl.study.records import Records
 
 DASHES = ("-", "--", "-.", ":")
+HUGE = 10.0  # of alpha ||phi||^2
 
 
 def thetas(records: Records) -> Matrix:
@@ -39,8 +40,8 @@ def thetas(records: Records) -> Matrix:
 
 
 def largest_steps(records: Records) -> Vector:
-    """The largest alpha ||phi||^2 of each episode."""
-    return metrics.by_episode(records, records.steps["alpha_phi2"], np.max)
+    """The largest alpha ||phi||^2 of each episode; what is above `HUGE` is drawn there."""
+    return metrics.by_episode(records, records.steps["alpha_phi2"].clip(max=HUGE), np.max)
 
 
 @page
@@ -74,10 +75,9 @@ def overshoot(runs: Runs[Records], learners: tuple[str, ...]) -> Drawn:
     """The largest alpha ||phi||^2 of each episode, one panel a decay; 2 is marked."""
     label = r"largest $\alpha\,\Vert\phi\Vert^2$ (no unit)"
     figure, panels = by_decay(runs, learners, largest_steps, label)
-    panels[0].set_yscale("symlog", linthresh=10)  # a step that overshoots may be huge
-    panels[0].set_ylim(0, None)
     for axes in panels:
         axes.axhline(OVERSHOOT, color=INK, ls=":", lw=1)
+    panels[0].set_ylim(0, None)
     shares = {
         name: np.median([metrics.overshooting(one) for one in runs.select(learner=name).values()])
         for name in learners

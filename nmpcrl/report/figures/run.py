@@ -107,7 +107,6 @@ def _steps(axes: Axes, records: Records) -> None:
     largest = largest_steps(records)
     each_episode(axes, largest, **LOOKS[records.experiment["learner"]].line)
     axes.axhline(OVERSHOOT, **LIMIT)
-    axes.set_yscale("symlog", linthresh=WIDE)
     axes.set_ylim(0, 1.1 * np.nanmax(largest, initial=1.1 * OVERSHOOT))
     over, count = (records.steps["alpha_phi2"] > OVERSHOOT).sum(), len(records.steps["episode"])
     axes.set_title(f"{over} of {count:,} steps above 2")
