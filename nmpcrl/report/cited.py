@@ -38,8 +38,7 @@ class Cited:
     quantity: str
 
     def __format__(self, form: str) -> str:
-        words = format(self.value, form).replace("inf%", "∞").replace("inf", "∞")
-        return cited(words, self.value, self.quantity)
+        return cited(finite(self.value, form), self.value, self.quantity)
 
     def __str__(self) -> str:
         return format(self)

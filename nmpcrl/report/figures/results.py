@@ -105,13 +105,20 @@ def learning_curves(
     options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, grid = subplots(len(CURVES), len(decays), 5.4, **options)
     for row, (label, curve) in zip(grid, CURVES.items(), strict=True):
+        most = 0.0
         for axes, decay in zip(row, decays, strict=True):
             for learner in learners:
                 runs = drawn.summaries.select(learner=learner, decay=decay).values()
                 along, costs = map(np.array, zip(*map(curve, runs), strict=True))
                 _costs(axes, along[0], costs, learner)
+                most = max(most, costs.max())
             over_episodes(axes, decay if row is grid[0] else "", "")
-        _to_the_ceiling(row)
+        row[0].set_yscale("log")
+        row[0].yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        row[0].yaxis.set_minor_locator(NullLocator())
+        row[0].yaxis.set_major_formatter("{x:g}")
+        if most > CEILING:
+            _to_the_ceiling(row)
         row[0].set_ylabel(label)
     for axes in grid[-1]:
         axes.set_xlabel("episode")
@@ -131,15 +138,13 @@ def _costs(axes: Axes, along: Vector, costs: Any, learner: str) -> None:
 
 
 def _to_the_ceiling(row: Sequence[Axes]) -> None:
-    """A logarithmic axis of cost with the strip of what lies above it."""
+    """Panels that share an axis of cost, with the strip of what lies above it."""
     for axes in row:
         axes.axhspan(STRIP[0], STRIP[2], **BAND)
         where: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
         axes.text(0.01, STRIP[1], f"> {CEILING:g}", fontsize="small", **where)
-    row[0].set(yscale="log", ylim=(None, STRIP[2]))
-    row[0].yaxis.set_major_locator(FixedLocator([0.7, *range(1, int(CEILING) + 1)]))
-    row[0].yaxis.set_minor_locator(NullLocator())
-    row[0].yaxis.set_major_formatter("{x:g}")
+    row[0].set_ylim(None, STRIP[2])
+    row[0].yaxis.set_major_locator(FixedLocator([*range(1, int(CEILING) + 1)]))
 
 
 @page
