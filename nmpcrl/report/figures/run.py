@@ -80,8 +80,8 @@ def _map(axes: Axes, records: Records, experiment: Experiment) -> None:
     axes.set(xlim=(task.lower[0] - 0.5, task.upper[0]), ylim=(low, high))
     axes.legend(loc="lower left")
     inside = int((task.overlap(path).max(axis=-1) > metrics.TOUCH).sum())
-    away, steps = task.distance(path[-1]), f"{len(path) - 1} of {len(states) - 1} steps"
-    axes.set_title(f"{away:.1f} from the target after {steps}, {inside} inside")
+    away = task.distance(path[-1])
+    axes.set_title(f"{away:.1f} from the target at the end, {inside} states inside")
 
 
 def _theta(axes: Axes, records: Records) -> None:
