@@ -1,12 +1,13 @@
 """Algorithm 1 as a generator, failed solves, and the rollout without noise."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from learning.small_runs import THETA, noise, run
 
-from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.control import Nmpc, Problem, SolverError, differential_drive
 from nmpcrl.learning import (
     UpdateRule,
     Weights,
@@ -184,6 +185,24 @@ def test_weights_that_are_not_numbers_or_absurd_are_a_divergence(robot, name, ab
     with pytest.raises(Diverged, match=rf"(?s)^{name} .*left the numbers"):
         steps.extend(train(learner, robot, Weights(THETA), noise(2, 5)))
     assert places(steps) == [(0, 0), (0, 1), (0, 2)]  # the step itself is kept
+
+
+@pytest.mark.parametrize(("factor", "steps"), [(2, 3), (1e4, 1)])
+def test_how_large_theta_may_grow_depends_on_its_start(factor, steps):
+    """A rate of Arrhenius's law, which multiplies exp(-25)."""
+    problem = Problem(
+        states=1, inputs=1, horizon=2, gamma=0.9, lower=-1, upper=1, theta={"rate": 7e10},
+        model=lambda x, u, th: x + 0.1 * (u - th["rate"] * np.exp(-25) * x),
+        stage=lambda x, u, th: x**2 + u**2,
+    )  # fmt: skip
+    nmpc, made = Nmpc(problem, solver="fatrop"), []
+    grown = UpdateRule(lambda theta, memory, *_: (factor * problem.theta, memory))
+    learner = replace(es(nmpc), rule=grown)
+    plant = {"plant": lambda x, u, rng: (0.9 * x, 0.0, False), "start": [0.5]}
+    outcome = nullcontext() if steps == 3 else pytest.raises(Diverged, match=r"^theta .* left the")
+    with outcome:
+        made.extend(train(learner, nmpc, Weights(problem.theta), noise(1, 3, 1), **plant))
+    assert len(made) == steps
 
 
 @pytest.mark.parametrize(
