@@ -134,3 +134,10 @@ def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
 def test_a_cliff_is_where_a_little_more_theta_c_costs_half():
     answer = population.cliff(pd.Series({"A": 0.0, "B": 0.6, "C": 1.4, "D": 0.1}))
     assert (answer.counts, answer.numbers) == ({"layouts": (2, 4)}, {"most": 1.4})
+
+
+@pytest.mark.parametrize(
+    ("whole", "words"), [([3, 4], "found by search"), ([3, 3], "contradicted")]
+)
+def test_a_setting_that_is_searched_for_confirms_nothing(whole, words):
+    assert population.whole_picture(pd.DataFrame({"whole": whole})).words == words

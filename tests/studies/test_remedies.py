@@ -133,3 +133,14 @@ def test_a_search_for_the_best_cost_made_again_ends_at_the_published_one():
                         if one.place == "J003")  # fmt: skip
     made = REMEDIES.make(one, setting)
     assert {rounded(made["cost"], REMEDIES.digits)} == {*known[known.place == "J003"].best}
+
+
+@pytest.mark.parametrize(
+    ("averaged", "words"),
+    [(0.4 + WIDE / 100, "contradicted"), (WIDE, "no difference shown"), (0.9, "confirmed")],
+)
+def test_a_difference_whose_interval_holds_0_is_none(averaged, words):
+    found = table(
+        *block("ES", gains=np.linspace(0.6, 0.7, 20)), *block("averaged-ES", gains=averaged)
+    )
+    assert REMEDIES.answers(found)["averaging"].words == words
