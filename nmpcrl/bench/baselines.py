@@ -69,11 +69,7 @@ def mx(nmpc: Nmpc) -> Solve:
 
 def rebuilt(nmpc: Nmpc) -> Solve:
     """A function of state, theta and the last plan that writes the problem anew at every call."""
-
-    def solve(state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
-        return mx(nmpc)(state, theta, last)
-
-    return solve
+    return lambda state, theta, last: mx(nmpc)(state, theta, last)
 
 
 def _written(

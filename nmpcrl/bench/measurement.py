@@ -13,8 +13,8 @@ from typing import Any
 import pandas as pd
 import psutil
 
+from nmpcrl.bench.learners import PROCESSES, time_learners_afresh
 from nmpcrl.bench.paired import IDLE
-from nmpcrl.bench.processes import PROCESSES, time_learners_afresh
 from nmpcrl.study import limits, lock, paper, provenance
 from nmpcrl.study.files import check_folder, folder, write_json
 from nmpcrl.study.machine import machine
@@ -41,20 +41,16 @@ class Measurement:
 
     def serves(self, length: str, *, calm: bool) -> bool:
         """Whether it is of this code and machine, long enough, and calm where that is asked for."""
-        known = list(LENGTHS)
-        return (
-            self.key == depends_on()
-            and known.index(self.length) >= known.index(length)
-            and not (calm and self.timings.waited.max() > IDLE)
-        )
+        known, busy = list(LENGTHS), calm and self.timings.waited.max() > IDLE
+        longer = known.index(self.length) >= known.index(length)
+        return self.key == depends_on() and longer and not busy
 
 
 def read_or_measure(length: str = "full", *, calm: bool = False) -> Measurement:
     """The timing table: read if this code was measured here, and at least so long; else measured.
 
-    Args:
-        length: one of `LENGTHS`.
-        calm: whether to measure again what was measured while other programs ran.
+    `length` is one of `LENGTHS`; with `calm`, what was measured while other programs ran is
+    measured again.
 
     Raises:
         ParameterError: there is no such length.
@@ -86,11 +82,7 @@ def measure(length: str) -> Measurement:
 
 
 def beforehand(length: str) -> tuple[Callable[[], Measurement], ...]:
-    """What a build calls with the machine to itself, so that a chapter reads.
-
-    Raises:
-        ParameterError: there is no such length.
-    """
+    """What a build calls with the machine to itself, so that a chapter reads."""
     check(length)
     return (partial(read_or_measure, length, calm=True),)
 
@@ -119,7 +111,6 @@ def path() -> Path:
 
 def depends_on() -> str:
     """The `key` of a table that is measured now."""
-    bench = [
-        lock.code(one.read_text("utf-8")) for one in sorted(Path(__file__).parent.glob("*.py"))
-    ]
+    own = sorted(Path(__file__).parent.glob("*.py"))
+    bench = [lock.code(one.read_text("utf-8")) for one in own]
     return provenance.hash_of([lock.sources_hash(), bench, provenance.environment(), machine()])

@@ -27,12 +27,7 @@ class Saving:
     rest_rdes: Vector  # r_RDES: of a step of RDES, all but solve and network [ms]
 
     def ratio(self, solve: float | Vector, warm: float | None = None) -> Any:
-        """RDES over ES for a solve of so many milliseconds.
-
-        Args:
-            solve: t, of any shape.
-            warm: u, where another than was measured is to be tried.
-        """
+        """RDES over ES for a solve of t milliseconds, with another u than measured if `warm`."""
         u = self._at(solve, self.warm) if warm is None else warm
         extra = self._at(solve, self.network + self.rest_rdes)
         return (solve + extra) / (2 * u * solve + self._at(solve, self.rest))

@@ -13,6 +13,7 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.bench import baselines
 from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.control.solvers.riccati import machine_code
 from nmpcrl.study import paper
 
@@ -29,10 +30,7 @@ def solvers(layout: str = "A", horizon: int = paper.HORIZON) -> dict[str, Solve]
 
     riccati, fatrop and ipopt are those of `Nmpc`; "ipopt MX" and "rebuilt" are `bench.baselines`.
     """
-    three = {
-        name: paper.nmpc(layout, horizon=horizon, solver=name)
-        for name in ("riccati", "fatrop", "ipopt")
-    }
+    three = {name: paper.nmpc(layout, horizon=horizon, solver=name) for name in SOLVERS}
     named: dict[str, Solve] = {name: nmpc.solve for name, nmpc in three.items()}
     problem = three["riccati"]
     return named | {"ipopt MX": baselines.mx(problem), "rebuilt": baselines.rebuilt(problem)}
@@ -42,17 +40,11 @@ def compare(named: dict[str, Solve], nmpc: Nmpc, steps: int = paper.STEPS) -> pd
     """Warm solves of the same recorded closed loops by each solver, each from its own last plan.
 
     The solvers take turns, a stretch of problems each, in an order drawn anew every time, so that
-    a change of the machine's speed meets all alike.
+    a change of the machine's speed meets all alike. `nmpc` acts in the loops, of so many steps.
 
-    Args:
-        named: of `solvers`; the first one is what the others are compared with.
-        nmpc: whose closed loop is recorded.
-        steps: of the loop without noise, and of that with noise.
-
-    Returns:
-        A row a loop and solver: median, p95 and max [us], times (the median over
-        the first solver's), iterations (the mean), and worse and failed: the shares of the problems
-        in which it ends above the best value of all (`WORSE`) and in which it finds no optimum.
+    Columns, a row a loop and solver: median, p95 and max [us], times (the median over that of the
+    first solver in `named`), iterations (the mean), and worse and failed: the shares of the
+    problems in which it ends above the best value of all (`WORSE`) and finds no optimum.
     """
     rng, rows = np.random.default_rng(0), []
     for solve in named.values():
@@ -66,17 +58,9 @@ def compare(named: dict[str, Solve], nmpc: Nmpc, steps: int = paper.STEPS) -> pd
     )
     each = warm.groupby(["loop", "solver"], sort=False)
     median = each.micro.median()
-    return pd.DataFrame(
-        {
-            "median": median,
-            "p95": each.micro.quantile(0.95),
-            "max": each.micro.max(),
-            "times": median / median.groupby("loop").transform("first"),
-            "iterations": each.iterations.mean(),
-            "worse": each.worse.mean(),
-            "failed": each.failed.mean(),
-        }
-    )
+    table = {"median": median, "p95": each.micro.quantile(0.95), "max": each.micro.max()}
+    table["times"] = median / median.groupby("loop").transform("first")
+    return pd.DataFrame(table | {k: each[k].mean() for k in ("iterations", "worse", "failed")})
 
 
 def _in_turns(
@@ -100,16 +84,9 @@ def _in_turns(
     for t in range(len(states)):
         best = min(plan[t].value for plan in plans.values() if plan[t])
         for name in named:
-            plan = plans[name][t]
-            rows.append(
-                {
-                    "solver": name,
-                    "warm": t > 0,
-                    "seconds": times[name][t],
-                    "iterations": plan.iterations if plan else np.nan,
-                    "above": (plan.value - best) / max(1.0, best) if plan else np.nan,
-                }
-            )
+            plan, row = plans[name][t], {"solver": name, "warm": t > 0, "seconds": times[name][t]}
+            above = (plan.value - best) / max(1.0, best) if plan else np.nan
+            rows.append(row | {"iterations": plan.iterations if plan else np.nan, "above": above})
     return rows
 
 

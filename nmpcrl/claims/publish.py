@@ -11,7 +11,7 @@ import pandas as pd
 from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.search import Search, SearchResult, search_all
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.bench.processes import time_learners_repeatedly
+from nmpcrl.bench.learners import time_learners_repeatedly
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import Measurement, measured
 from nmpcrl.claims.paper_claims import BY_TIME

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.bench import processes
+from nmpcrl.bench import learners
 from nmpcrl.claims import published
 
 
@@ -21,8 +21,8 @@ def test_learners_that_are_timed_afresh_are_pooled_over_the_processes(monkeypatc
         rows = [each | es, each | rdes | {"ratio": ratio}]
         return pd.DataFrame(rows)
 
-    monkeypatch.setattr(processes, "_time_learners", alone)
-    es, rdes = processes.time_learners_afresh(3).to_dict("records")
+    monkeypatch.setattr(learners, "_time_learners", alone)
+    es, rdes = learners.time_learners_afresh(3).to_dict("records")
     assert rdes["ratio"] == pytest.approx(0.6)
     assert rdes["ratio_low"] < 0.5
     assert rdes["ratio_high"] > 0.72
@@ -34,12 +34,12 @@ def test_learners_that_are_timed_afresh_are_pooled_over_the_processes(monkeypatc
 
 def test_at_least_nine_of_ten_published_repetitions_hold_what_they_come_to():
     timings = published.load().timings
-    assert set(timings.repetitions) == {processes.REPETITIONS}
+    assert set(timings.repetitions) == {learners.REPETITIONS}
     assert timings.inside.min() >= 9
 
 
 @pytest.mark.slow
 def test_a_process_of_its_own_hands_back_the_table():
-    table = processes._time_learners(2)
+    table = learners._time_learners(2)
     assert len(table) == 3 * 4
     assert list(table.ms_per_fit.isna()) == [True, True, False, False] * 3
