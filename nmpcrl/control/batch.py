@@ -18,6 +18,7 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, Status, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.riccati import ABSURD, SOLVED, Compiled, Riccati
+from nmpcrl.control.solvers.solver import Asked
 from nmpcrl.control.variant import Variant
 
 FAILED, REFUSED = "failed", "refused"
@@ -127,10 +128,10 @@ def solve_many(
         solver[rows], left = Riccati.name, rows[~good]
     for k in left.tolist():  # by CasADi's solvers, one at a time
         begin = None if warm is None or not warm.solved[k] else warm[k]
-        action = () if actions is None else (actions[k],)
+        action = np.empty(0) if actions is None else actions[k]
         known = data[min(k, len(data) - 1)]
         try:
-            one = variant.solve(states[k], thetas[k], begin, *action, began=began, data=known)
+            one = variant.solve(Asked(states[k], thetas[k], begin, action, known, began))
         except SolverError:
             status[k] = FAILED
             continue
@@ -143,7 +144,7 @@ def solve_many(
 
 
 def table(name: str, value: Any, size: int, count: int | None = None) -> Matrix:
-    """A copy of rows of this size; with a `count`, so many, or one row for all."""
+    """A copy of shape (B, size); with a `count`, (count, size), of so many rows or one for all."""
     try:
         rows = np.array(value, dtype=float, order="C")  # machine code takes no other
     except (TypeError, ValueError):

@@ -41,9 +41,8 @@ class Bending:
             (found, *_), (other, *_) = np.linalg.eigvalsh(bends)
             if found < min(0.0, other) - ROUNDING * np.abs(bends).max():
                 self.least = np.where(fell, -np.inf, self.least)
-                names = [name for name in of.names if of.names.part(name, fell).any()]
                 warnings.warn(
-                    f"theta {', '.join(names)} turned negative, and a cost of the plan bends"
+                    f"theta {of.names.marked(fell)} turned negative, and a cost of the plan bends"
                     f" downwards in state {short(state)}, so that a worst plan may be taken for"
                     " the best: write Parameter(start, lower=0), and learners keep it positive",
                     stacklevel=3,

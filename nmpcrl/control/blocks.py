@@ -38,6 +38,10 @@ class Blocks(Named):
         """The entries of one name in a vector, or in the last axis of an array."""
         return vector[..., self._places[name]]
 
+    def marked(self, which: Any) -> str:
+        """The names with an entry that is true in a vector of flags, with commas between."""
+        return ", ".join(name for name in self if self.part(name, which).any())
+
     def split(self, vector: Vector) -> dict[str, Any]:
         """Every array by its name; a float where it is a single number."""
         arrays = {name: self.part(name, vector).reshape(self[name]) for name in self}
@@ -68,7 +72,7 @@ class Blocks(Named):
 
 
 def numbers(name: str, value: Any, *, empty: bool = False) -> Matrix:
-    """An array of finite numbers, not `empty` unless that is allowed; ValueError for all else."""
+    """An array of finite numbers, which may be `empty` where that is allowed; else ValueError."""
     try:
         array = np.array(value, float)
     except (TypeError, ValueError):

@@ -50,7 +50,7 @@ EXPORTS = (task_cost,)
 
 
 def texts(of: Plant | Problem, task: Task | None = None) -> dict[str, str]:
-    """What is compiled: the text of each module by its name; a `Problem` has no task.
+    """The texts to compile, by name of the module; a `Problem` has no task.
 
     Its functions are those of `solvers.entries`, and of `TASK` where there is a task. All numbers
     that `problem` returns are arguments of the functions.
@@ -88,7 +88,7 @@ def _inner(name: str, of: dict[str, ca.SX], result: ca.SX) -> str:
 def problem(
     of: Problem, solver: riccati.Riccati = riccati.DEFAULT, *, ties_active: bool = False
 ) -> dict[str, Any]:
-    """What a host is given beside the module, as JSON takes it.
+    """The numbers that a host passes to the module, for JSON.
 
     These are the sizes that `solvers.model` names, the units of states and inputs, in which all
     else is given, and the `ARRAYS`: `riccati.Arguments` with `kind` for u_0 free and given, and the
@@ -120,7 +120,7 @@ def problem(
 
 
 def packed(described: dict[str, Any]) -> Vector:
-    """What `problem` describes as the array whose address the module's functions are given."""
+    """The result of `problem` as one array, whose address the module's functions take."""
     arrays = {name: np.array(described[name], float) for name in ARRAYS}
     arrays["weights"][np.isnan(arrays["weights"])] = np.inf
     lines = (arrays["weights"].size - described["fixed"]) // max(described["per"], 1)

@@ -21,7 +21,7 @@ def expression(
     size: int,
     unit: str,
 ) -> ca.SX:
-    """A user's function as a column of `size` entries, any if 0; ValueError for all else."""
+    """A user's function in symbols, a column of `size` entries, or of any if 0; else ValueError."""
     if function is None:
         return ca.SX(0)
     signature = [key for key, one in symbols.items() if one is not None and one.numel()]
@@ -55,7 +55,7 @@ def expression(
 
 
 def mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
-    """Why a function cannot be called with these arguments; "" if it can, or is not known to."""
+    """Why a function cannot be called with these arguments; "" if it can, or Python cannot tell."""
     try:
         inspect.signature(function).bind(*arguments)
     except ValueError:

@@ -18,13 +18,12 @@ from nmpcrl.control.batch import Batch, solve_many, stage_data, table
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.content import Described, key_of
 from nmpcrl.control.diagnosis import FARTHEST
-from nmpcrl.control.gradient import Gradient
 from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
-from nmpcrl.control.sensitivity import Sensitivity
+from nmpcrl.control.sensitivity import Gradient, Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, short
-from nmpcrl.control.solvers import Fatrop, Riccati, Solver, solver_of
+from nmpcrl.control.solvers import Asked, Fatrop, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
@@ -35,6 +34,7 @@ FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns eit
 
 DEFAULT = Riccati()
 HORIZON, GAMMA, SLACK_WEIGHT = 10, 0.97, 100.0
+FREE = np.empty(0)  # no u_0 is given
 
 
 class Nmpc(Described):
@@ -132,16 +132,15 @@ class Nmpc(Described):
         known = self.problem.stage_data(data)
         if min(theta.tolist()) < 0.0 and (theta < self._bending.least).any():
             self._bending.judge(state, theta, known)
-        given: tuple[Vector, ...] = ()
+        given = FREE
         if action is not None:
-            action = _checked("action", action, self.m, self._strongest)
+            given = action = _checked("action", action, self.m, self._strongest)
             if (action < self.lower).any() or (action > self.upper).any():
                 bounds = f"{short(self.lower)} and {short(self.upper)}"
                 raise ValueError(f"action {short(action)} must lie between {bounds}")
-            given = (action,)
-        variant = self._fixed if given else self._free
+        variant = self._free if action is None else self._fixed
         try:
-            return variant.solve(state, theta, warm_start, *given, began=began, data=known)
+            return variant.solve(Asked(state, theta, warm_start, given, known, began))
         except SolverError as error:
             why, other = variant.diagnosis.why(state, theta, known), ""
             if not isinstance(variant.solver, Compiled):  # which asked fatrop itself
@@ -238,7 +237,7 @@ class Nmpc(Described):
         J = value V + sum_i inputs_i' u_i + sum_i states_i' x_i. Without weights it is V: then
         `state` is dV/ds and `data` dV/dd. With `value` 0 and a single 1 in `inputs` it is an
         entry of the plan: du/ds, du/dtheta and du/dd, at kinks as in `policy_jacobian`. By riccati
-        that is a sweep, compiled for the problem where it is first asked for.
+        that is one sweep.
 
         Of a batch of B, weights and derivatives have a first axis of B; its derivatives are 0
         where no optimum was found, and the value's alone where the plan has none.
@@ -284,7 +283,7 @@ class Nmpc(Described):
 
         It takes half a minute, once on a machine, and says on standard error what it does and for
         how long: numba's typing takes two thirds, LLVM one. CasADi's solvers take no time.
-        `gradient` of a plan is compiled at its first call, and the loop of `learning` at a run's.
+        The loop of `learning` is compiled at the first run.
         """
         if isinstance(self._free.solver, Compiled):
             _ = self._free.solver.slopes

@@ -58,7 +58,7 @@ class Ocp:
 
     @property
     def tie(self) -> float:
-        """A row of stage 0 is violated where it is larger, in parts of its size."""
+        """A row of stage 0 counts as violated above this share of its size."""
         return -TIE if self.ties_active else TIE
 
     @cached_property

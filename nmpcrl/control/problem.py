@@ -47,8 +47,8 @@ class Soft:
     row: Callable[..., Any]  #: (x, u, th) -> h, a number or a column; with d where there are data
     #: W > 0, a number, or one a row; or th -> W, a learned number: slacks are then in units of cost
     weight: Any = 1.0
-    stages: Any = None  #: among 0, ..., N, an index, a slice or a list; all possible ones if None
-    each: str | None = None  #: a table in data, every line of it has these rows, and is d[each]
+    stages: Any = None  #: where they hold: an index, a slice or a list in 0, ..., N; all if None
+    each: str | None = None  #: a table in data: each of its lines has these rows, and is d[each]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ Rows = dict[str, Soft | Hard]  # by name in messages
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Data that differ between stages, the default where `Nmpc.solve` is given none."""
+    """Data that differ between stages: the default where `Nmpc.solve` is given none."""
 
     values: Any  #: an array with a first axis of N + 1
 
@@ -342,10 +342,9 @@ class Problem(Described):
     def step(
         self, x: Any, u: Any, theta: Any = None, *, data: Mapping[str, Any] | None = None
     ) -> Vector:
-        """The model's next state f(x, u, theta, d), shape (n,): a plant, with a theta of its own.
+        """The model's next state f(x, u, theta, d), shape (n,).
 
         `theta` has shape (d,), its start if absent, and `data` are arrays of one stage by name.
-        `problem.step(x, u, problem.vector(mass=1.3))` has one parameter that the plan's does not.
         """
         found: Vector = self._stage_of(x, u, theta, data)[0].full().ravel()
         return found
@@ -359,6 +358,14 @@ class Problem(Described):
         plant that charges a row at x is learned on with plans that do so at stage 0, too.
         """
         return float(self._stage_of(x, u, theta, data)[1])
+
+    def plant(self, **values: Any) -> Callable[..., tuple[Vector, float, bool]]:
+        """A plant that moves as this problem does with other parameters, at the plan's cost.
+
+        learn(nmpc, plant=problem.plant(mass=1.3), start=[0.0]) is learning with a wrong mass.
+        """
+        truth = self.vector(**values)
+        return lambda x, u, rng: (self.step(x, u, truth), self.cost(x, u), False)
 
     def _stage_of(self, x: Any, u: Any, theta: Any, data: Mapping[str, Any] | None) -> Any:
         theta = self.theta if theta is None else theta

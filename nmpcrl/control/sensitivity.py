@@ -5,6 +5,10 @@ the derivative of the optimal value is the *partial* derivative of L: to first o
 does not matter (Fiacco 1983; Gros and Zanon 2020). To second order it does, and the implicit
 function theorem on the KKT conditions supplies it.
 
+A number J = v V + sum w u of value and plan changes with p, the state, theta, a given u_0 and the
+data, by v L_p + w' du/dp: one solve of the KKT system with w on its right, and not one for each
+entry of p. That is `Sensitivity` of an OCP with all of p in the place of theta.
+
 Where more rows and bounds are active than the inputs can follow, the plan has a kink. The value's
 gradient then lies between those of the two sides, and every other derivative is that of one side:
 theta + t (1, ..., 2) for small t > 0, where all parameters grow, the last twice as fast as the
@@ -12,6 +16,7 @@ first. The multipliers of that side are those of largest growth along it, a line
 """
 
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -37,6 +42,16 @@ def lagrangian(ocp: Ocp) -> tuple[ca.SX, ca.SX]:
     return ocp.objective + ca.dot(lam, ocp.constraints), lam
 
 
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """The derivatives of a number in what a solve was given."""
+
+    state: Vector  #: in s, shape (n,)
+    theta: Vector  #: shape (d,)
+    action: Vector  #: in the u_0 that was given, shape (m,), or (0,) where it was free
+    data: dict[str, NDArray[np.float64]]  #: by name, each of N + 1 stages, shape (N + 1, ...)
+
+
 class Sensitivity:
     """The derivatives of an OCP's optimal value, evaluated at a primal-dual solution.
 
@@ -52,10 +67,10 @@ class Sensitivity:
         results = ca.cse([ocp.objective, ca.gradient(self._lagrangian, ocp.theta)])
         self._value_and_gradient = ca.Function("value_and_gradient", self._arguments, results)
 
-    def value_and_gradient(self, z: Vector, p: Vector, lam: Vector) -> tuple[float, Vector]:
-        """V = f(z; p) and dV/dtheta = dL/dtheta, shape (2n + m + 1,): the envelope theorem."""
+    def value_and_gradient(self, z: Matrix, p: Matrix, lam: Matrix) -> tuple[Matrix, Matrix]:
+        """V = f(z; p) and dV/dtheta = dL/dtheta, a column a solution: the envelope theorem."""
         value, gradient = self._value_and_gradient(z, p, lam)
-        return float(value), gradient.full().ravel()
+        return value.full(), gradient.full()
 
     def hessian(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> Matrix:
         """d2V/dtheta2, shape (d, d) with d = 2n + m + 1, while the active set does not change.
@@ -84,7 +99,8 @@ class Sensitivity:
         row, bound = self._active(z, g.ravel(), lam, nu)
         active = np.vstack([g_z[row], np.eye(z.size)[bound]])
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
-        if _dependent(active):
+        left = np.abs(np.diag(qr(active.T, mode="r", pivoting=True)[0]))
+        if len(active) > active.shape[1] or left.min() < DEPENDENT * left.max():  # to first order
             free = np.append(ocp.equality[row], np.zeros(bound.sum(), bool))
             held, multipliers = _one_side(active, active_t, np.append(lam[row], nu[bound]), free)
             lam = lam.copy()
@@ -151,6 +167,30 @@ class Sensitivity:
         )
         return float(max(np.abs(violation).max(initial=0) for violation in violations))
 
+    def along(self, z: Matrix, p: Matrix, lam: Matrix, step: Matrix, weights: Matrix) -> Matrix:
+        """w' dz/dp by steps of z and lam that solve K step + w = 0: L_p along them, a column each.
+
+        It needs all of p in theta. The multipliers of x_0 = s and of a given u_0, which are 0 in a
+        step, are found here.
+        """
+        found: Matrix = self._along(z, p, lam, step, weights).full()
+        return found
+
+    @cached_property
+    def _along(self) -> ca.Function:
+        ocp, n, m = self._ocp, self._ocp.initial.size, self._ocp.fixed_action.size
+        step = ca.SX.sym("step", ocp.lower.size + self._lam.numel())
+        w = ca.SX.sym("w", ocp.lower.size)
+        given = np.concatenate([ocp.states[0], ocp.inputs[0][:m]]).tolist()
+        slope = ca.gradient(self._lagrangian, ocp.variables)[given]
+        both = ca.vertcat(slope, ca.gradient(self._lagrangian, ocp.theta))
+        moved = ca.jtimes(both, ca.vertcat(ocp.variables, self._lam), step)
+        pulled, found = moved[: n + m] + w[given], moved[n + m :]
+        at = n + ocp.problem.names.size
+        for k, one in zip([*range(n), *range(at, at + m)], ca.vertsplit(pulled), strict=True):
+            found[k] += one
+        return ca.Function("along", [*self._arguments, step, w], [found])
+
     @cached_property
     def _conditions(self) -> ca.Function:
         slope = ca.gradient(self._lagrangian, self._ocp.variables)
@@ -194,12 +234,6 @@ class Sensitivity:
                     K = K[1:, 1:] - K[1:, 0] @ K[0, 1:] / K[0, 0]
             V = K
         return ca.Function("pivots", [*self._arguments, bound, active], [least, size])
-
-
-def _dependent(active: Matrix) -> bool:
-    """Whether some active constraint follows from the others to first order."""
-    left = np.abs(np.diag(qr(active.T, mode="r", pivoting=True)[0]))
-    return bool(len(active) > active.shape[1] or left.min() < DEPENDENT * left.max())
 
 
 def _one_side(

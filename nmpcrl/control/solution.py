@@ -31,8 +31,8 @@ class Status(StrEnum):
     """How an optimum was found."""
 
     SOLVED = "solved"
-    RESTARTED = "restarted"  #: not from the start that was asked for
-    TAKEN_OVER = "taken over"  #: by `Solution.solver`, where the one asked for found no optimum
+    RESTARTED = "restarted"  #: from another start, since the first one failed
+    TAKEN_OVER = "taken over"  #: by another solver, since the chosen one found no optimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Solution:
     data: Matrix  #: d_0, ..., d_N, shape (N + 1, size)
     restarts: int = 0  #: how often the solver had to begin again
     violation: float = 0.0  #: how far the plan leaves the box, in the unit of the state
-    took_over: bool = False  #: whether another solver found it than the one that was asked
+    took_over: bool = False  #: whether `solver` is another than the chosen one
 
     @property
     def status(self) -> Status:

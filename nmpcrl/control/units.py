@@ -13,7 +13,7 @@ from nmpcrl.control.solution import Solution
 
 
 class Units:
-    """An OCP and the one that is solved in its place, `ocp`; the same where units are `trivial`."""
+    """An OCP, and in `ocp` the scaled one that is solved; both are one if units are `trivial`."""
 
     def __init__(self, ocp: Ocp) -> None:
         self._outer, self.ocp, solved = ocp, ocp, ocp.problem.solved

@@ -9,11 +9,10 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import Diagnosis
-from nmpcrl.control.gradient import Backward, Gradient
 from nmpcrl.control.ocp import Ocp
-from nmpcrl.control.sensitivity import Sensitivity
+from nmpcrl.control.sensitivity import Gradient, Sensitivity
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError
-from nmpcrl.control.solvers import Solver
+from nmpcrl.control.solvers import Asked, Solver
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.units import Units
 
@@ -66,7 +65,7 @@ class Variant:
         inside = [self.units.inside(one) for one in solutions]
         of_each = ((one.primal, one.parameters, one.constraint_duals) for one in inside)
         given = [np.array(part).T for part in zip(*of_each, strict=True)]
-        found = value * self._backward.gradient(*given)
+        found = value * self._backward.value_and_gradient(*given)[1]
         steps = {}
         for k in np.flatnonzero(w.any(axis=1)).tolist():
             step = self.compiled(Compiled.adjoint, solutions[k], w[k])
@@ -89,22 +88,19 @@ class Variant:
         """The compiled solver; None where another one solves, or where units are not 1."""
         return self.solver if self.units.trivial and isinstance(self.solver, Compiled) else None
 
-    def _solve_in_units(
-        self,
-        state: Vector,
-        theta: Vector,
-        warm_start: Solution | None,
-        *action: Vector,
-        **others: Any,
-    ) -> Solution:
+    def _solve_in_units(self, asked: Asked) -> Solution:
         """`Prepared.solve` in the units of `Units.ocp`."""
-        units = self.units
+        units, state, warm_start, action = self.units, asked.state, asked.warm_start, asked.action
         begin = None if warm_start is None else units.inside(warm_start)
-        scaled = [one / units.inputs for one in action]
+        inside = asked._replace(
+            state=state / units.states,
+            warm_start=begin,
+            action=action / units.inputs[: action.size],
+        )
         try:
-            found = self.solver.solve(state / units.states, theta, begin, *scaled, **others)
+            found = self.solver.solve(inside)
         except SolverError as error:
-            raise type(error)(error.status, state, theta) from None
+            raise type(error)(error.status, state, asked.theta) from None
         return units.outside(found, state)
 
     def compiled(
@@ -123,7 +119,7 @@ class Variant:
         of: Sensitivity | None = None,
         **how: Any,
     ) -> Any:
-        """A function of `Sensitivity`, in theta if not `of` another; DerivativeError if none."""
+        """A method of `Sensitivity` at a solution, in theta by default; else DerivativeError."""
         inside = self.units.inside(solution)
         duals = inside.constraint_duals, inside.bound_duals
         try:
@@ -142,8 +138,9 @@ class Variant:
         return Sensitivity(self.units.ocp)
 
     @cached_property
-    def _backward(self) -> Backward:
-        return Backward(self.units.ocp)
+    def _backward(self) -> Sensitivity:
+        """Derivatives in all of p."""
+        return Sensitivity(replace(self.units.ocp, theta=self.units.ocp.parameters))
 
     @cached_property
     def in_state(self) -> Sensitivity:

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.learning.bootstrap import Controller, Transition
+from nmpcrl.control import Nmpc
+from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.learners import (
     Learner,
     Move,
@@ -25,22 +26,22 @@ from nmpcrl.learning.learners import (
 from nmpcrl.learning.updates import of_length
 
 
-def frozen(nmpc: Controller) -> Learner:
-    """The same exploration and the same noise, and theta never moves."""
+def frozen(nmpc: Nmpc) -> Learner:
+    """No learning: theta stays, under the same noise."""
     return Learner("frozen", nothing, semi_gradient(0.0), nmpc.gamma)
 
 
 def nothing(transition: Transition, theta: Vector) -> None:
-    """A bootstrap that values no state, so that nothing is learned."""
+    """A bootstrap without a value, which skips every learning step."""
 
 
-def step_matched(nmpc: Controller, alpha: float, beta: float) -> Learner:
+def step_matched(nmpc: Nmpc, alpha: float, beta: float) -> Learner:
     """ES with steps as long as those of GES: it separates direction and length."""
     rule = as_far_as(gradient_td(alpha, beta, nmpc.gamma), semi_gradient(alpha))
     return Learner.of("matched", nmpc, rule)
 
 
-def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -> Learner:
+def random_direction(nmpc: Nmpc, alpha: float, rng: np.random.Generator) -> Learner:
     """Steps as long as those of ES, in directions that `rng` draws."""
     rule = as_far_as(semi_gradient(alpha), UpdateRule(partial(_anywhere, rng)))
     return Learner.of("random", nmpc, rule)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Solution
+from nmpcrl.control import Nmpc, Solution
 
 if TYPE_CHECKING:
     from nmpcrl.learning.network import Predictor, QNetwork, Target
@@ -28,9 +28,9 @@ class Transition:
     cost: float  #: l(s, a)
     next_state: Vector  #: s+, shape (n,)
     solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
-    end: bool = False  #: whether s+ ends the episode, and is worth 0
-    last: bool = False  #: whether the episode is over, by `end`, or since its time is
-    next_data: Mapping[str, Any] | None = None  #: what a `Problem` knows of the stages from s+ on
+    end: bool = False  #: whether s+ is terminal, and worth 0
+    last: bool = False  #: whether it is the last of its episode, for whatever reason
+    next_data: Mapping[str, Any] | None = None  #: data of a `Problem` for a solve in s+
     first: bool = False  #: whether it is the first of its episode
 
 
@@ -45,26 +45,6 @@ class NextValue:
     seconds: float = 0.0  #: spent on fit and prediction [s]; a solve keeps its own time
 
 
-class Controller(Protocol):
-    """All that learning asks of control: `nmpcrl.control.Nmpc`, or anything that acts like it."""
-
-    @property
-    def gamma(self) -> float:
-        """The discount factor of the value."""
-
-    def solve(
-        self, state: Vector, theta: Vector, warm_start: Solution | None = None,
-        action: Vector | None = None, *, data: Mapping[str, Any] | None = None,
-    ) -> Solution:  # fmt: skip
-        """See `nmpcrl.control.Nmpc.solve`; data are given only where there are any."""
-
-    def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
-        """See `nmpcrl.control.Nmpc.value_hessian_times`; only exact TDC asks for it."""
-
-    def policy_jacobian(self, solution: Solution) -> Matrix:
-        """See `nmpcrl.control.Nmpc.policy_jacobian`; only DPG asks for it."""
-
-
 class Bootstrap(Protocol):
     """Anything that values the next state of a transition."""
 
@@ -76,7 +56,7 @@ class Bootstrap(Protocol):
 class SecondSolve:
     """Solve the NMPC again in the next state, Eq. (7): ES and GES."""
 
-    nmpc: Controller
+    nmpc: Nmpc
 
     def __call__(self, transition: Transition, theta: Vector) -> NextValue:
         """Start from the first solution, shifted by a stage."""
@@ -100,8 +80,8 @@ class Imitation:
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
     fits: int = 1  # mini-batches a step  # departure H
     target: "Target | None" = None  # predicts in the network's place  # departure I
-    late: bool = False  # predict before the fits, as where they run in parallel  # departure I
-    actions: tuple[Vector, Vector] | None = None  # a box, whose best is a+  # departure I
+    late: bool = False  # predict before the fits, as if they ran in parallel  # departure I
+    actions: tuple[Vector, Vector] | None = None  # bounds within which a+ is best  # departure I
 
     def __call__(self, transition: Transition, theta: Vector) -> NextValue | None:
         """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+); a+ = u_1 of the plan."""

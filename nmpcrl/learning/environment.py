@@ -1,9 +1,8 @@
-"""The environment that a controller acts in, which need not be what its NMPC plans with.
+"""The environment: the plant, its cost and its start, which may differ from the NMPC's model.
 
-A `gymnasium.Env` is one, too: a reward is a cost with the other sign. A state in which Gymnasium
-terminates an episode is worth 0; after a truncation a state keeps its worth.
-
-Functions of the user are given copies, and their results are copied, as numbers of type float.
+A `gymnasium.Env` is one, too: a cost is minus its reward. A state in which Gymnasium terminates an
+episode is worth 0; after a truncation a state keeps its worth. Functions of the user are given
+copies, and their results are copied as floats.
 """
 
 import sys
@@ -100,7 +99,7 @@ def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
 
 
 def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool) -> str:
-    """Why no plan can begin in a state of the plant; "" if one can, or it is finite at the end."""
+    """Why no plan can begin in a state; "" if one can, or if a finite episode ends there."""
     largest = sys.float_info.max if nmpc is None or end else nmpc.farthest
     if all(abs(number) <= largest for number in state.tolist()):
         return ""
@@ -111,13 +110,13 @@ def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool) -> str:
 
 
 def nmpc_of(controller: Any) -> Nmpc | None:
-    """The `Nmpc` that a controller is or has among its attributes; None where there is none."""
+    """The `Nmpc` that a controller is, or holds as an attribute; None where there is none."""
     near = [controller, *getattr(controller, "__dict__", {}).values()]
     return next((one for one in near if isinstance(one, Nmpc)), None)
 
 
 def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
-    """A generator as it is; of an int one whose numbers `default_rng` of that int does not draw."""
+    """A generator as it is, or one of an int, apart from the stream of `default_rng` of it."""
     if isinstance(rng, int | np.integer):
         rng = np.random.SeedSequence(int(rng), spawn_key=(key,))  # type: ignore[assignment]
     return np.random.default_rng(rng)
@@ -174,7 +173,7 @@ def of_gymnasium(
 
 
 def timed(plant: Callable[..., Any], start: Start) -> tuple[StepFunction, Start]:
-    """A plant that is told the time, as one of three arguments, and a start that sets it to 0."""
+    """A plant (state, action, rng, t) as one of three arguments, and a start that sets t to 0."""
     clock = count()
 
     def begin(rng: np.random.Generator) -> Any:

@@ -42,7 +42,7 @@ class ClosedLoop:
     derivatives: StageDerivatives
 
     def init(self, weights: Weights) -> Sensitivities:
-        """None yet: the start does not depend on theta."""
+        """Zeros: the start does not depend on theta."""
         d = weights.theta.size
         return Sensitivities(np.zeros((self.nmpc.n, d)), np.zeros(d), np.zeros((d, d)))
 

@@ -26,7 +26,7 @@ def as_gymnasium(
     box: Any = gymnasium.spaces.Box
 
     class NmpcEnv(gymnasium.Env[Vector, Vector]):
-        """Begins, steps, charges and ends as `train` would."""
+        """The start, the steps, the costs and the ends of `train`."""
 
         metadata = {"render_modes": []}  # noqa: RUF012 as Gymnasium has it
 

@@ -170,7 +170,11 @@ def learn(
                     break
     except Diverged as error:
         diverged = str(error)
-    history = _history(found, resume)
+    history = {"episode": np.repeat([one.number for one in found], [one.steps for one in found])}
+    for name in found[0].columns:
+        history[name] = np.concatenate([one.columns[name] for one in found])
+    if resume:
+        history = {k: np.concatenate([resume.history[k], v]) for k, v in history.items()}
     at = [(history["action"] == side).mean(axis=0) for side in (nmpc.lower, nmpc.upper)]
     if (np.minimum(*at) > CLIPPED).any():
         warn("clipped", f"shares of {short(at[0])} and {short(at[1])} of the actions lie at the"
@@ -215,7 +219,7 @@ def _deviation(nmpc: Nmpc, given: Any) -> Vector:
 
 
 def _overshoot(learner: Learner, episode: Episode) -> str:
-    """What to say of a learner whose steps have a size and overshoot; "" where none does."""
+    """The warning of a learner whose steps overshoot; "" where none does."""
     alpha = getattr(learner.rule.step, "alpha", 0.0)
     square = float(np.nan_to_num((episode.columns["features"] ** 2).sum(axis=1)).max(initial=0.0))
     if not alpha * square > OVERSHOOT:
@@ -227,19 +231,12 @@ def _overshoot(learner: Learner, episode: Episode) -> str:
 
 
 def _negative(nmpc: Nmpc, least: Vector, episode: Episode) -> str:
-    """What to say of entries of theta that fell below `least`; "" where none did."""
-    of, fell = nmpc.problem.names, (episode.columns["theta"] < least).any(axis=0)
+    """The warning of entries of theta that fell below `least`; "" where none did."""
+    fell = (episode.columns["theta"] < least).any(axis=0)
     if not fell.any():
         return ""
-    names = ", ".join(name for name in of if of.part(name, fell).any())
+    names = nmpc.problem.names.marked(fell)
     return (
         f"theta {names} turned negative in episode {episode.number}, and weighs a cost, which may"
         " then bend downwards: write Parameter(start, lower=0), and learners keep it positive"
     )
-
-
-def _history(found: list[Episode], resume: Learned | None) -> dict[str, Any]:
-    """The columns of all episodes, one array each, behind those of an earlier run."""
-    new = {"episode": np.repeat([one.number for one in found], [one.steps for one in found])}
-    new |= {name: np.concatenate([one.columns[name] for one in found]) for name in found[0].columns}
-    return {k: np.concatenate([resume.history[k], v]) for k, v in new.items()} if resume else new

@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.control import Nmpc
 from nmpcrl.learning.bootstrap import (
     Bootstrap,
-    Controller,
     Imitation,
     NextValue,
     SecondSolve,
@@ -64,7 +64,7 @@ def no_memory(weights: Weights) -> None:
 
 
 def unchanged(theta: Vector, memory: Any) -> tuple[Vector, Any]:
-    """Learn nothing from a failed episode."""
+    """Keep theta and memory after a failed episode."""
     return theta, memory
 
 
@@ -82,7 +82,7 @@ class UpdateRule:
     # (theta, memory, transition, TD error, next value) -> the next theta and memory
     step: Callable[[Vector, Any, Transition, float, NextValue], tuple[Vector, Any]]
     init: Callable[[Weights], Any] = no_memory  #: before the first step
-    # (theta, memory) -> the same, after an episode that a failed solve ended, perhaps at once
+    # (theta, memory) -> the next ones, after an episode that a failed solve ended
     interrupted: Callable[[Vector, Any], tuple[Vector, Any]] = unchanged
 
 
@@ -116,7 +116,7 @@ class GradientTD:
     alpha: float  #: step size of theta
     beta: float  #: of w
     gamma: float
-    curved: Controller | None = None  #: knows the Hessian, for the term that Eq. (16) drops
+    curved: Nmpc | None = None  #: knows the Hessian, for the term that Eq. (16) drops
     follow: Callable[[Vector, float, Vector, float], Vector] = auxiliary_step  #: moves w
 
     def __call__(
@@ -166,14 +166,14 @@ def theta_bounds(nmpc: Any) -> Bounds | None:
 
 @dataclass(frozen=True)
 class Learner:
-    """A bootstrap and an update rule; a step is pure but for their network or generator."""
+    """A bootstrap and an update rule; only their network or generator changes in place."""
 
     name: str  #: as tables show it
     bootstrap: Bootstrap  #: values the next state
     rule: UpdateRule  #: moves theta
     gamma: float  #: discount factor of the TD error
     bounds: Bounds | None = None  #: into which theta is projected after each step
-    values_actions: bool = False  #: whether it is meant for Q(s, a), and not for V(s)
+    values_actions: bool = False  #: whether it learns Q(s, a) in place of V(s)
 
     def __post_init__(self) -> None:
         if not isinstance(self.rule, UpdateRule):
@@ -183,7 +183,7 @@ class Learner:
 
     @classmethod
     def of(
-        cls, name: str, nmpc: Controller, rule: UpdateRule, bootstrap: Bootstrap | None = None,
+        cls, name: str, nmpc: Nmpc, rule: UpdateRule, bootstrap: Bootstrap | None = None,
         bounds: Bounds | None = None, **options: Any,
     ) -> "Learner":  # fmt: skip
         """A learner with the gamma and the bounds of an NMPC; its bootstrap is a second solve."""
@@ -227,14 +227,14 @@ def _projected(step: Move, bounds: Bounds, *given: Any) -> tuple[Vector, Any]:
 
 
 def weights_after(before: Weights, theta: Vector, memory: Any) -> Weights:
-    """Weights with the w that is in the memory or in its `inner` one; without any, the w before."""
+    """The next weights: w is that of the memory or of its `inner` one, else the one before."""
     found = memory
     while found is not None and not isinstance(found, Auxiliary):
         found = getattr(found, "inner", None)
     return Weights(theta, before.w if found is None else found.w, memory)
 
 
-def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
+def expected_sarsa(nmpc: Nmpc, alpha: float) -> Learner:
     """ES: two solves a step, Eq. (7), and a semi-gradient, Eq. (9).
 
     Source: Moradimaryamnegari et al. (2022).
@@ -242,9 +242,7 @@ def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
     return Learner.of("ES", nmpc, semi_gradient(alpha))
 
 
-def deep_expected_sarsa(
-    nmpc: Controller, network: "QNetwork", alpha: float, **options: Any
-) -> Learner:
+def deep_expected_sarsa(nmpc: Nmpc, network: "QNetwork", alpha: float, **options: Any) -> Learner:
     """DES: a network of (s, a) instead of the second solve, Eq. (11); a semi-gradient, Eq. (9).
 
     `options` are those of `Imitation`.
@@ -254,7 +252,7 @@ def deep_expected_sarsa(
 
 
 def regularized_deep_expected_sarsa(
-    nmpc: Controller, network: "QNetwork", alpha: float, **options: Any
+    nmpc: Nmpc, network: "QNetwork", alpha: float, **options: Any
 ) -> Learner:
     """RDES, the paper's first method: DES, and theta is an input of the network, too.
 
@@ -264,13 +262,13 @@ def regularized_deep_expected_sarsa(
     return Learner.of("RDES", nmpc, semi_gradient(alpha), imitation)
 
 
-def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:
+def gradient_expected_sarsa(nmpc: Nmpc, alpha: float, beta: float) -> Learner:
     """GES, the paper's second method: two solves a step, Eq. (7), and gradient TD, Eq. (16)."""
     return Learner.of("GES", nmpc, gradient_td(alpha, beta, nmpc.gamma))
 
 
 def gradient_tdc(
-    nmpc: Controller,
+    nmpc: Nmpc,
     alpha: float,
     beta: float,
     *,
@@ -291,7 +289,7 @@ def gradient_tdc(
     return Learner.of("TDC", nmpc, rule, bounds=projection)
 
 
-def q_learning(nmpc: Controller, alpha: float) -> Learner:
+def q_learning(nmpc: Nmpc, alpha: float) -> Learner:
     """QL: two solves a step, semi-gradient of the action value proper (Gros and Zanon 2020).
 
     A step's transition must hold the solution with u_0 = a fixed, whose value is Q_theta(s, a), as

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control import Nmpc
 from nmpcrl.learning.batches import Statistics, batched
-from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
+from nmpcrl.learning.bootstrap import NextValue, Transition
 from nmpcrl.learning.learners import Learner
 from nmpcrl.learning.optimisers import Bounds, Descent, Optimiser
 
@@ -57,7 +58,7 @@ def no_successor(transition: Transition, theta: Vector) -> NextValue:
     return NextValue(np.nan)
 
 
-def policy_statistics(nmpc: Controller, transition: Transition, _: float) -> CriticMeans:
+def policy_statistics(nmpc: Nmpc, transition: Transition, _: float) -> CriticMeans:
     """What one step adds to `CriticMeans`; ValueError where u_0 was fixed: that is no policy."""
     solution = transition.solution
     if solution.ocp.fixed_action.size:
@@ -83,7 +84,7 @@ def policy_gradient_estimate(regularisation: float, *found: Any) -> Statistics:
 
 
 def policy_gradient(
-    nmpc: Controller,
+    nmpc: Nmpc,
     alpha: float = 1e-3,
     *,
     every: int | None = None,

@@ -7,8 +7,8 @@ TDRC       gradient TD with one step size, whose w decays
 GES-3      gradient TD, beta = 3 alpha, and steps of w that cannot overshoot
 guarded    what a learner would, with alpha at most 1 / ||phi||^2
 directed   the direction of ES, as far as a learner would
-scheduled  what a learner would, by a part that changes with the steps
-averaged   what a learner would; what is judged is the mean theta
+scheduled  what a learner would, times a factor that changes with the steps
+averaged   what a learner would; the mean theta is judged
 undone     what a learner would, and back where a rollout without noise costs more
 =========  =======================================================================
 
@@ -21,8 +21,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from nmpcrl import Vector
+from nmpcrl.control import Nmpc
 from nmpcrl.learning.baselines import as_far_as
-from nmpcrl.learning.bootstrap import Controller, Transition
+from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.learners import (
     Learner,
     Move,
@@ -58,7 +59,7 @@ def guard(alpha: float, phi: Vector) -> float:
     return min(alpha, 1 / square) if square > 0 else alpha
 
 
-def tdrc(nmpc: Controller, alpha: float, regularisation: float = REGULARISATION) -> Learner:
+def tdrc(nmpc: Nmpc, alpha: float, regularisation: float = REGULARISATION) -> Learner:
     """TDRC: two solves a step, Eq. (16) with one step size, and w decays.
 
     Source: Ghiassian et al. (2020).  Their features are of unit size: where ||phi||^2 is large, a
@@ -68,7 +69,7 @@ def tdrc(nmpc: Controller, alpha: float, regularisation: float = REGULARISATION)
     return Learner.of("TDRC", nmpc, gradient_td(alpha, alpha, nmpc.gamma, follow=follow))
 
 
-def normalised_ges(nmpc: Controller, alpha: float, ratio: float = 3.0) -> Learner:
+def normalised_ges(nmpc: Nmpc, alpha: float, ratio: float = 3.0) -> Learner:
     """GES-3: w moves faster than theta, as two-time-scale theory asks, by `normalised_step`."""
     rule = gradient_td(alpha, ratio * alpha, nmpc.gamma, follow=normalised_step)
     return Learner.of("GES-3", nmpc, rule)
@@ -94,7 +95,7 @@ def _guarded(
 
 
 def directed(learner: Learner, alpha: float) -> Learner:
-    """The control of a remedy: its lengths, in the direction of ES, which has step size alpha."""
+    """The control of a remedy: steps of its lengths in the direction of ES with step size alpha."""
     rule = as_far_as(of_each_step(learner, "this control"), semi_gradient(alpha))
     return replace(learner, name=f"{learner.name} directed", rule=rule)
 
@@ -159,7 +160,7 @@ class Counted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Scheduling(Around):
-    """The functions of a rule that goes a part of its way."""
+    """The functions of a rule whose step k is `part(k)` of another's."""
 
     rule: UpdateRule
     part: Callable[[int], float]
@@ -173,7 +174,7 @@ class Scheduling(Around):
 
 
 def scheduled(learner: Learner, part: Callable[[int], float]) -> Learner:
-    """A learner whose step k moves theta by `part(k)` of its way: alpha becomes alpha part(k).
+    """A learner whose step k is `part(k)` of another's: alpha becomes alpha part(k).
 
     scheduled(q_learning(nmpc, 1e-3), lambda k: 1 / (1 + k / 500)) is Robbins and Monro's (1951).
     """

@@ -91,7 +91,7 @@ class Exploration:
         self, noise: Any = None, scale: Any = None, *, episodes: int = 1, steps: int = 100,
         deviation: Any = 0.1, seed: int = 0, first: int = 0,
     ) -> None:  # fmt: skip
-        """Take noise and scale, or draw noise of a standard deviation, an array of one an input.
+        """Take noise and scale, or draw noise of a standard deviation, a number or one an input.
 
         Each episode has a stream of its own, so that fewer episodes have the same noise, and
         episodes from `first` on go on where an earlier run of as many ended.

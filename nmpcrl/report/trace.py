@@ -17,6 +17,7 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.solvers.codes import End
 from nmpcrl.control.solvers.riccati import Compiled, Riccati, machine_code
+from nmpcrl.control.solvers.solver import Asked
 from nmpcrl.control.units import Units
 
 
@@ -61,6 +62,7 @@ def trace(
     """
     units = Units(ocp)
     ocp, state = units.ocp, state / units.states
+    data = ocp.problem.data if data is None else data
     warm_start = None if warm_start is None else units.inside(warm_start)
     plain = interpreted(ocp.problem)
     solve, soft = plain.solve, np.flatnonzero(ocp.problem.soft)
@@ -92,7 +94,7 @@ def trace(
         _straighten(plain)
     with np.errstate(all="ignore"):
         Compiled(ocp, plain.find, Riccati(starts=1)).solve(
-            state, theta, warm_start, began=0.0, data=ocp.problem.data if data is None else data
+            Asked(state, theta, warm_start, np.empty(0), data, 0.0)
         )
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
     iterates.loc[iterates.index[-1], "delta"] = np.nan  # a look at the curvature of the solution

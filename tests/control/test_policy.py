@@ -17,12 +17,6 @@ def nmpc() -> Nmpc:
     return Nmpc(pendulum(), solver="fatrop")
 
 
-def moved(nmpc):
-    """The plan's own model and costs as a plant."""
-    problem = nmpc.problem
-    return lambda x, u, rng: (problem.step(x, u), problem.cost(x, u), False)
-
-
 @pytest.fixture(scope="module")
 def theta(nmpc):
     return nmpc.problem.vector(rate=1.5)
@@ -32,7 +26,7 @@ def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before(nmpc, the
     policy = Policy(nmpc, theta)
     for _ in range(2):
         policy.reset()
-        loop = evaluate(nmpc, theta, STEPS, plant=moved(nmpc), start=STATE)
+        loop = evaluate(nmpc, theta, STEPS, plant=nmpc.problem.plant(), start=STATE)
         assert [policy(state).tolist() for state in loop.states] == loop.actions.tolist()
 
 
@@ -41,7 +35,7 @@ def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before(nmpc, the
 )
 def test_each_way_of_calling_sees_the_data_of_its_time(nmpc, theta, data):
     """A forecast of 9 stages, of which 7 are seen at a time."""
-    loop = evaluate(nmpc, theta, 3, plant=moved(nmpc), start=STATE, data=data)
+    loop = evaluate(nmpc, theta, 3, plant=nmpc.problem.plant(), start=STATE, data=data)
     policy, wanted, before = Policy(nmpc, theta, data), loop.actions.tolist(), None
     assert [policy(state).tolist() for state in loop.states] == wanted
     policy.reset()

@@ -24,6 +24,14 @@ def test_step_and_cost_are_the_functions_of_the_problem_with_numbers():
         assert problem.cost(x, u, theta, data=data) == pytest.approx(cost, rel=1e-13)
 
 
+def test_a_plant_moves_with_its_own_parameters_at_the_cost_of_the_plan():
+    problem, x, u = pendulum(), [0.3, 0.9], [0.5]
+    later, cost, end = problem.plant(rate=1.7)(np.array(x), np.array(u), None)
+    assert later.tolist() == problem.step(x, u, problem.vector(rate=1.7)).tolist()
+    assert later.tolist() != problem.step(x, u).tolist()
+    assert (cost, end) == (problem.cost(x, u), False)
+
+
 def test_every_line_of_a_table_has_its_price():
     discs = np.array([[0.0, 1.0], [0.5, 0.2]])
     problem = Problem(

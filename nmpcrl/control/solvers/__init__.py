@@ -7,12 +7,13 @@ from nmpcrl.control.solvers.solver import (
     LARGEST_TOLERANCE,
     LEAST_TOLERANCE,
     TOLERANCE,
+    Asked,
     Prepared,
     Solver,
 )
 
 __all__ = [
-    "LARGEST_TOLERANCE", "LEAST_TOLERANCE", "SOLVERS", "TOLERANCE", "Fatrop", "Ipopt",
+    "LARGEST_TOLERANCE", "LEAST_TOLERANCE", "SOLVERS", "TOLERANCE", "Asked", "Fatrop", "Ipopt",
     "Prepared", "Riccati", "Solver", "real_time", "solver_of",
 ]  # fmt: skip
 

@@ -7,7 +7,6 @@ as well. A plan that is no strict minimum is compared with plans from other star
 """
 
 import time
-from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,13 +15,13 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
-from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, Asked, Solver
 from nmpcrl.control.solvers.starts import random_inputs
 
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
@@ -43,9 +42,9 @@ class Nlpsol(Solver):
     starts: ClassVar[dict[Start, dict[str, Any]]]  #: options of warm starts, stay near them
 
     @property
-    @abstractmethod
     def options(self) -> dict[str, Any]:
-        """The solver's own options, whatever the start."""
+        """The solver's own options, whatever the start: silent, and bounded."""
+        return {"print_level": 0, "tol": self.tolerance, "max_iter": MAX_ITERATIONS}
 
     def structure(self, ocp: Ocp) -> dict[str, Any]:
         """Options of `nlpsol` that describe the problem's structure."""
@@ -61,7 +60,7 @@ NEAR = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mul
 
 @dataclass(frozen=True)
 class Ipopt(Nlpsol):
-    """Ipopt: the paper's solver, for any NLP."""
+    """Ipopt, the paper's solver: an interior point for any NLP."""
 
     name: ClassVar[str] = "ipopt"
     starts: ClassVar[dict[Start, dict[str, Any]]] = dict.fromkeys(
@@ -72,20 +71,14 @@ class Ipopt(Nlpsol):
 
     @property
     def options(self) -> dict[str, Any]:
-        """Silent, and bounded in iterations and time."""
-        return {
-            "print_level": 0,
-            "sb": "yes",
-            "tol": self.tolerance,
-            "max_iter": MAX_ITERATIONS,
-            "max_cpu_time": MAX_SECONDS,
-            "bound_relax_factor": 0.0,
-        }
+        """Bounded in time, too."""
+        own = {"sb": "yes", "max_cpu_time": MAX_SECONDS, "bound_relax_factor": 0.0}
+        return super().options | own
 
 
 @dataclass(frozen=True)
 class Fatrop(Nlpsol):
-    """fatrop: an interior point that follows the stages, as fast as CasADi's get here.
+    """fatrop: an interior point that works stage by stage, the fastest of CasADi's here.
 
     Version 1.1.8 may never return where all plans lead to enormous states; riccati and Ipopt do.
     """
@@ -96,11 +89,6 @@ class Fatrop(Nlpsol):
         Start.SHIFTED: {"bound_push": 1e-3},
         Start.SAME: {"mu_init": 1e-4, "bound_push": 1e-6},
     }
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """Silent, and bounded."""
-        return {"print_level": 0, "tol": self.tolerance, "max_iter": MAX_ITERATIONS}
 
     def structure(self, ocp: Ocp) -> dict[str, Any]:
         """fatrop finds the stages itself."""
@@ -131,21 +119,13 @@ class Program:
         for start in (Start.COLD, *solver.starts):
             self._function(solver, start)
 
-    def solve(
-        self,
-        state: Vector,
-        theta: Vector,
-        warm_start: Solution | None,
-        *action: Vector,
-        began: float,
-        data: Matrix,
-    ) -> Solution:
-        """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
-        p = np.concatenate([state, theta, *action, data.ravel()])
-        known: dict[str, Any] = {"state": state, "theta": theta, "data": data}
+    def solve(self, asked: Asked) -> Solution:
+        """See `Prepared.solve`."""
+        state, theta, warm_start, action, data, began = asked
+        p = np.concatenate([state, theta, action, data.ravel()])
         failed: list[str] = []
         for solver, start, point in self._starts(warm_start, state):
-            found = self._attempt(solver, start, point, p, known)
+            found = self._attempt(solver, start, point, p, asked)
             if isinstance(found, Solution):
                 break
             failed.append(found)
@@ -157,7 +137,7 @@ class Program:
         ):
             for seed in range(ELSEWHERE):
                 drawn = self._standing(state, seed, share=1.0)
-                other = self._attempt(self._solver, Start.COLD, drawn, p, known)
+                other = self._attempt(self._solver, Start.COLD, drawn, p, asked)
                 least = found.value - CLEARLY * abs(found.value)
                 if isinstance(other, Solution) and other.value < least:
                     restarts, best = restarts + seed + 1, other
@@ -187,7 +167,7 @@ class Program:
             yield solver, Start.COLD, self._standing(state)
 
     def _attempt(
-        self, solver: Nlpsol, start: Start, point: PrimalDual, p: Vector, known: dict[str, Any]
+        self, solver: Nlpsol, start: Start, point: PrimalDual, p: Vector, asked: Asked
     ) -> Solution | str:
         """An optimum, or why there is none."""
         ocp, factor, units, rows = self._ocp, self._factor, self._units, self._rows
@@ -214,15 +194,9 @@ class Program:
         self._settle_stage_zero(lam, nu, p)
         value, features = self._sensitivity.value_and_gradient(z, p, lam)
         return Solution(
-            value=value,
-            features=features,
-            iterations=int(stats["iter_count"]),
-            seconds=0.0,
-            point=np.concatenate([z, lam, nu]),
-            ocp=ocp,
-            solver=solver.name,
-            **known,
-        )
+            asked.state, asked.theta, value.item(), features.ravel(), int(stats["iter_count"]), 0.0,
+            np.concatenate([z, lam, nu]), ocp, solver.name, asked.data,
+        )  # fmt: skip
 
     def _written(self, solver: Nlpsol, start: Start) -> ca.Function:
         """`nlpsol` with objective, variables and constraints in their units."""

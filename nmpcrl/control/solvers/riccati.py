@@ -21,7 +21,7 @@ from nmpcrl.control.solution import Solution, SolverError
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Ipopt, Program, reorder
-from nmpcrl.control.solvers.solver import LED_ASTRAY, Prepared, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, Asked, Prepared, Solver
 from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
 
@@ -42,10 +42,6 @@ TEXTS = {  # compiled beside `model`; read with the other modules, so that an ed
     name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
     for name in ("codes", "kernel", "find", "slopes")
 }
-OF_PLAN = {  # what `slopes` is made of, without `slopes`
-    "slopes": TEXTS["slopes"].partition("\n\nSIGNATURE")[0],
-    "adjoint": files(__package__).joinpath("adjoint.py").read_text("utf-8"),
-}
 ABSURD = 1e24  # no value is larger
 UNBOUNDED = 1e20  # stands for an input without a bound
 
@@ -64,18 +60,14 @@ class Arguments(NamedTuple):
 
 
 def machine_code(problem: Problem, entry: str = "find") -> Any:
-    """The function `find.find`, `slopes.slopes` or `adjoint.adjoint`, compiled for a problem once.
+    """The function `find.find` or `slopes.slopes`, compiled for a problem once.
 
     Raises:
         CannotCompile: numba is missing, or the problem holds an operation that is not known.
     """
     if entry not in problem.machine_code:
-        texts = {
-            "__init__": f"from .{entry} import {entry}\n",
-            "model": stages.write(problem),
-            **{name: TEXTS[name] for name in ("codes", "kernel")},
-            **(OF_PLAN if entry == "adjoint" else {entry: TEXTS[entry]}),
-        }
+        texts = {name: TEXTS[name] for name in ("codes", "kernel", entry)}
+        texts |= {"__init__": f"from .{entry} import {entry}\n", "model": stages.write(problem)}
         notice = NOTICE if entry == "find" else PLAN_NOTICE
         problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
     return problem.machine_code[entry]
@@ -87,7 +79,7 @@ class Riccati(Solver):
 
     name: ClassVar[str] = "riccati"
     code: Callable[[Problem], Any] = field(default=machine_code, repr=False)
-    starts: int = SEVERAL  #: cold; of several, another is held by feedback, and the best counts
+    starts: int = SEVERAL  #: cold starts; of 2 or more, and one held by feedback, the best counts
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -100,7 +92,7 @@ class Riccati(Solver):
         return jit.numba_version() is not None
 
     def prepare(self, ocp: Ocp) -> Prepared:
-        """The compiled solver; fatrop, and a warning, where there can be none."""
+        """The compiled solver; fatrop, with a warning, where it cannot be compiled."""
         try:
             return Compiled(ocp, self.code(ocp.problem), self)
         except CannotCompile as error:
@@ -146,17 +138,10 @@ class Compiled:
         )
         self._rest = self.arguments[1:]
 
-    def solve(
-        self,
-        state: Vector,
-        theta: Vector,
-        warm_start: Solution | None,
-        *action: Vector,
-        began: float,
-        data: Matrix,
-    ) -> Solution:
-        """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
-        given = action[0] if action else self._no_action
+    def solve(self, asked: Asked) -> Solution:
+        """See `Prepared.solve`."""
+        state, theta, warm_start, action, data, began = asked
+        given = action if self._fixed else self._no_action
         start, point = COLD, self._standing
         if warm_start is not None:
             same = warm_start.state.tolist() == state.tolist()  # faster than np.array_equal
@@ -173,7 +158,7 @@ class Compiled:
                 int(failed), violation,
             )  # fmt: skip
         try:
-            found = self._last_resort.solve(state, theta, None, *action, began=began, data=data)
+            found = self._last_resort.solve(asked._replace(warm_start=None))
         except SolverError:
             raise SolverError(
                 f"{Riccati.name} found no optimum from {failed:.0f} starts (the last"
@@ -189,41 +174,36 @@ class Compiled:
         return Program(self._ocp, Ipopt(self.tolerance))
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
-        """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
+        """The value's Hessian in theta times a vector (d,); None where dense algebra must do it."""
         return self._slopes(solution, vector, self._no_action)
 
     def policy(self, solution: Solution) -> Matrix | None:
-        """du_0 / dtheta, shape (m, d), a sweep an input; None likewise."""
+        """du_0 / dtheta, shape (m, d), a sweep an input; None as above."""
         still, weights = np.zeros(solution.theta.size), np.eye(self._problem.inputs)
         found = [self._slopes(solution, still, one) for one in weights]
         return None if any(one is None for one in found) else np.array(found)
 
     def feedback(self, solution: Solution) -> Matrix | None:
-        """du_0 / ds, shape (m, n), the gain of stage 0; None likewise."""
+        """du_0 / ds, shape (m, n), the gain of stage 0; None as above."""
         d, shape = solution.theta.size, (self._problem.inputs, self._problem.states)
-        found = self._slopes(solution, np.zeros(d), self._no_action, more=shape[0] * shape[1])
+        found = self._slopes(solution, np.zeros(d), self._no_action, d + shape[0] * shape[1])
         return None if found is None else found[d:].reshape(shape)
 
     def adjoint(self, solution: Solution, weights: Vector) -> Vector | None:
-        """The step of z and lam by `adjoint.adjoint`, for weights of z; None likewise."""
-        if solution.took_over:
-            return None
-        action = solution.action if self._fixed else self._no_action
-        given = (solution.state, solution.theta, action, self._fixed, solution.point)
-        out = np.zeros(self._ocp.lower.size + self._ocp.equality.size)
-        code = machine_code(self._problem, "adjoint")
-        return out if code(solution.data, *self._rest, *given, weights, out) else None
+        """The step of z and lam, K step + w = 0, for weights w of z; None as above."""
+        size = self._ocp.lower.size + self._ocp.equality.size
+        return self._slopes(solution, np.zeros(solution.theta.size), weights, size)
 
     def _slopes(
-        self, solution: Solution, along: Vector, of_action: Vector, *, more: int = 0
+        self, solution: Solution, along: Vector, of_plan: Vector, size: int | None = None
     ) -> Vector | None:
-        """`slopes.slopes` along a direction of theta, of a sum of u_0 with these weights."""
+        """`slopes.slopes` along a direction of theta, of a sum of the plan with these weights."""
         if solution.took_over:  # whose states are not rolled out
             return None
         action = solution.action if self._fixed else self._no_action
         given = (solution.state, solution.theta, action, self._fixed, solution.point)
-        out = np.empty(solution.theta.size + more)
-        formed = self.slopes(solution.data, *self._rest, *given, along, of_action, out)
+        out = np.zeros(solution.theta.size if size is None else size)
+        formed = self.slopes(solution.data, *self._rest, *given, along, of_plan, out)
         return out if formed else None
 
     @cached_property

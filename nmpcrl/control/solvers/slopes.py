@@ -2,9 +2,10 @@
 
 If theta moves along w, the solution moves along (dx, du, dp, dlam), which solves Newton's system of
 `kernel` with the derivative of KKT along w on the right: K step + G w = 0. The value's Hessian is
-then the change of its gradient along (step, w), L_tt w + G' step. A weighted sum s' u_0 of inputs
-changes by -s' K^-1 G w, so its gradient in theta is G' step with K step + s = 0: the same sweep,
-one for each input and not one for each parameter.
+then the change of its gradient along (step, w), L_tt w + G' step. A weighted sum s' z of states and
+inputs changes by -s' K^-1 G w, so its gradient in theta is G' step with K step + s = 0: the same
+sweep, one for each sum and not one for each parameter. Of the step itself its gradient in anything
+that the problem was given is the change of the Lagrangian's gradient in that.
 
 Where more rows and bounds are active than the inputs can follow, the barrier would share the rest
 between them. `independent` finds such points, at which `Sensitivity` takes one side of a kink.
@@ -32,6 +33,7 @@ from .kernel import (
     linearise,
     measure,
     options,
+    places,
     recall,
     roll,
     rows_along,
@@ -42,7 +44,7 @@ from .kernel import (
     task_of,
     vector,
 )
-from .model import NTHETA, NU, NX
+from .model import FIXED, NTHETA, NU, NX, PER
 
 STIFF = 1e4  # at least, where a row is active
 GOLDEN = 0.6180339887498949
@@ -163,18 +165,37 @@ def system(
     return task, point, stages, step, factor, independent(task, stages, step)
 
 
+@inlined
+def write_step(task, stages, step, factor, out):
+    """The step of z and lam; slacks, and multipliers of x_0 = s and of a given u_0, have none."""
+    N = len(step.u)
+    z_size, g_size, rows, _, _ = places(N + 1, task.lines, task.first)
+    for i in range(N + 1):
+        g = rows + i * g_size - (NX if i == N else 0)
+        for a in range(NX):
+            out[i * z_size + a] = step.x[i, a]
+        for a in range(NU if i < N else 0):
+            out[i * z_size + NX + a] = step.u[i, a]
+        for a in range(NX if i < N else 0):
+            after = g - NX if i > 0 else g - 2 * NX - task.first * NU
+            out[after + a] = -factor * costate(step, i + 1, a)
+        for j in range(FIXED + PER * task.lines):
+            out[g + j] = factor * step.lam[i * task.rows + j]
+
+
 SIGNATURE = types.boolean(*PROBLEM, vector, vector, vector, vector)
 
 
 @njit(SIGNATURE, cache=True, **options)
 def slopes(
     data, lower, upper, sides, kind, discount, weights, tie,
-    state, theta, action, fixed, solved, w, of_action, out,
+    state, theta, action, fixed, solved, w, of_plan, out,
 ):  # fmt: skip
-    """The Hessian times w, plus the gradient of the sum of u_0 with weights, shape (NTHETA,).
+    """The Hessian times w, plus the gradient of the sum of u_0 with weights (NU,), shape (NTHETA,).
 
-    Returns whether it could be formed: see `system`. Where `out` has NU NX more places, they are
-    du_0 / ds, the gain of stage 0.
+    Where `out` has NU NX more places, they are du_0 / ds, the gain of stage 0. With weights of all
+    z, in the order of `Ocp`, `out` is the step of z and lam in its place: see `write_step`. Returns
+    whether it could be formed: see `system`.
     """
     task, point, stages, step, factor, formed = system(
         data, lower, upper, sides, kind, discount, weights, state, theta, action, fixed, solved
@@ -183,21 +204,28 @@ def slopes(
         return False
     N = len(discount) - 1
     right_hand_side(task, point, stages, w)
-    for a in range(NU):
-        stages.r[0, a] += of_action[a] / factor
+    whole, z_size = len(of_plan) > NU, places(N + 1, task.lines, task.first)[0]
+    for i in range(N + 1 if whole else 1):
+        for a in range(NX if whole else 0):
+            stages.q[i, a] += of_plan[i * z_size + a] / factor
+        for a in range(NU if i < N else 0):
+            stages.r[i, a] += of_plan[i * z_size + NX + a if whole else a] / factor
     factorise(stages, 0.0, task.first, step)
     sweep(task, stages, step)
     for i in range(task.first, N):
         for a in range(NU):
             if not abs(step.u[i, a]) < FARTHEST:
                 return False
+    rows_along(task, stages, step)
+    scale_rows(task, stages, step)
+    if whole:
+        write_step(task, stages, step, factor, out)
+        return True
     for k in range(len(out) - NTHETA):
         out[NTHETA + k] = step.K[0, k // NX, k % NX] if task.first == 0 else 0.0
     for i in range(1, N + 1):
         for a in range(NX):
             step.p[i, a] = costate(step, i, a)
-    rows_along(task, stages, step)
-    scale_rows(task, stages, step)
     settle(task, point, tie, point.h, stages.firm, stages.held)
     gradient_along(task, point, stages, step, factor, w, out)
     return True

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import SUBSTEPS
@@ -14,19 +14,22 @@ LED_ASTRAY = f"led through numbers that are absurd: {SUBSTEPS}"
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
 
 
+class Asked(NamedTuple):
+    """The arguments of a solve, checked: see `Nmpc.solve`."""
+
+    state: Vector
+    theta: Vector
+    warm_start: Solution | None
+    action: Vector  #: u_0, shape (m,), or (0,) where it is free
+    data: Matrix  #: d_0, ..., d_N
+    began: float  #: `time.perf_counter()` before the checks
+
+
 class Prepared(Protocol):
     """A solver that is ready for one OCP."""
 
-    def solve(
-        self,
-        state: Vector,
-        theta: Vector,
-        warm_start: Solution | None,
-        *action: Vector,
-        began: float,
-        data: Matrix,
-    ) -> Solution:
-        """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
+    def solve(self, asked: Asked) -> Solution:
+        """An optimum; SolverError where none is found."""
 
 
 @dataclass(frozen=True)
