@@ -24,6 +24,7 @@ from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import RUNS, SEARCHES, TIMINGS
 from nmpcrl.claims.verdict import Outcome, Verdict
 from nmpcrl.report.cited import Count
+from nmpcrl.report.tables import shown
 from nmpcrl.report.text import SURE
 from nmpcrl.studies import interventions, population, remedies
 from nmpcrl.studies.agents import SAC_AND_TD3
@@ -187,8 +188,8 @@ def summary_table(counts: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(columns, counts.index).rename_axis(None).replace("0 of 0", "")
 
 
-def table(both: pd.DataFrame, group: str) -> pd.DataFrame:
-    """The lines of a group: of the first edition, and of what is published today."""
+def table(both: pd.DataFrame, group: str) -> str:
+    """The lines of a group in HTML: of the first edition, and of what is published today."""
     rows = {
         f"{one.name}. {one.today.text or one.first.text}": {
             "expected": one.first.expected,
@@ -198,7 +199,7 @@ def table(both: pd.DataFrame, group: str) -> pd.DataFrame:
         }
         for one in both[both.group == group].itertuples()
     }
-    return pd.DataFrame.from_dict(rows, "index")
+    return shown(pd.DataFrame.from_dict(rows, "index"), group)
 
 
 # Lines of each source.

@@ -8,7 +8,7 @@ import pandas as pd
 
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.cited import Cited
-from nmpcrl.report.tables import badge, html_table
+from nmpcrl.report.tables import badge, shown
 from nmpcrl.studies.remedies import (
     ADVISED,
     FIRST,
@@ -56,17 +56,18 @@ WHAT: dict[str, tuple[str, str]] = {  # what an entry is, and what it is told; i
 
 def advice_table(advised: pd.DataFrame, caption: str) -> str:
     """The table of `remedies.advice` in HTML, a row an entry, with evidence and price by budget."""
-    judged = (PARTS[part] for part in ADVISED)
-    budgets = (f"With {one.episodes} episodes (seeds a layout: {one.seeds})" for one in judged)
-    cells = []
+    rows = {}
     for entry, found in advised.groupby("entry", sort=False):
         what, told = WHAT[entry]
         known = {row.part: _evidence(row) for row in found.itertuples()}
-        name = escape(found.name.iloc[0]).replace("[", "<br>[")
-        word = found.word.iloc[0]
-        told = f"{badge(word, COLOURS[word])}<br>{what}<br><small>learns from {told}</small>"
-        cells.append((f"<code>{name}</code>", told, *(known.get(part, "–") for part in ADVISED)))
-    return html_table(caption, ("Method", "Try it", *budgets), cells, headed=True)
+        name, word = escape(found.name.iloc[0]).replace("[", "<br>["), found.word.iloc[0]
+        rows[f"<code>{name}</code>"] = {
+            "try it": f"{badge(word, COLOURS[word])}<br>{what}<br><small>learns from {told}</small>"
+        } | {
+            f"with {PARTS[part].episodes} episodes (seeds a layout: {PARTS[part].seeds})":
+            known.get(part, "–") for part in ADVISED
+        }  # fmt: skip
+    return shown(pd.DataFrame.from_dict(rows, "index"), caption, escape=False)
 
 
 def _evidence(row: Any) -> str:

@@ -38,7 +38,23 @@ PUBLISHED = "published"  # whose numbers a table shows, if nothing else is said
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
 
 
-def claim_table(claims: Iterable[Claim]) -> pd.DataFrame:
+def shown(frame: pd.DataFrame, caption: str = "", *, escape: bool = True) -> str:
+    """A table of words in HTML: whole sentences, which pages and Jupyter would put to the right.
+
+    Args:
+        frame: its index names the rows.
+        caption: stands above it.
+        escape: whether cells are text; else they are HTML already.
+    """
+    with pd.option_context("display.max_colwidth", None, "display.max_rows", None):
+        html = frame.to_html(border=0, escape=escape, classes="table words")
+    html = re.sub(r"<(t[hd])>", r'<\1 style="text-align: left">', html)
+    return (
+        html.replace("<thead>", f"<caption>{_text(caption)}</caption><thead>") if caption else html
+    )
+
+
+def claim_table(claims: Iterable[Claim]) -> str:
     """One row a claim: what will be asked of each run, and how it will be decided."""
     rows = {
         c.name: {
@@ -48,56 +64,46 @@ def claim_table(claims: Iterable[Claim]) -> pd.DataFrame:
         }
         for c in claims
     }
-    return pd.DataFrame.from_dict(rows, "index")
+    return shown(pd.DataFrame.from_dict(rows, "index"))
 
 
 def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verdict] = ()) -> str:
-    """One row a claim, in HTML: what the paper says, and what became of it here.
+    """One row a claim: what the paper says, and what became of it here.
 
     Args:
         verdicts: of `judge`.
         scope: what they rest on, a sentence for the caption.
         beside: what other runs say of the same claims, for a column of their own.
     """
-    others = {v.claim: v for v in beside}
-    rows = (
-        (
-            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}",
-            _outcome(v),
-            *([_outcome(others[v.claim], "runs of this page")] if others else []),
-        )
-        for v in verdicts
-    )
-    header = ("The paper claims", "Published", "Runs of this page")
-    return html_table(scope, header if others else ("The paper claims", "Here"), rows)
+    others, rows = {v.claim: v for v in beside}, {}
+    for v in verdicts:
+        words = {"the paper claims": f"{_aside(v)}{_text(v.statement)}", "published": _outcome(v)}
+        if others:
+            words["runs of this page"] = _outcome(others[v.claim], "runs of this page")
+        rows[f"<strong>{v.claim}</strong>"] = words
+    return shown(pd.DataFrame.from_dict(rows, "index"), scope, escape=False)
 
 
 def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
-    """One row a claim, in HTML: its outcome overall, in each layout, and in each reading."""
-    decided = [v for v in verdicts if v.by_layout]
-    layouts = dict.fromkeys(name for v in decided for name in v.by_layout)
-    decays = dict.fromkeys(name for v in decided for name in v.by_decay)
-    header = ("Claim", "All", *layouts, *(f"per {name}" for name in decays))
-    rows = (
-        (
-            f"<strong>{_text(v.claim)}</strong>",
-            _word(v.outcome),
-            *(_word(v.by_layout.get(name)) for name in layouts),
-            *(_word(v.by_decay.get(name)) for name in decays),
-        )
-        for v in decided
-    )
-    return html_table(caption, header, rows, headed=True)
+    """One row a claim: its outcome overall, in each layout, and with each decay of the noise."""
+    rows = {
+        f"<strong>{v.claim}</strong>": {"all": _word(v.outcome)}
+        | {name: _word(outcome) for name, outcome in v.by_layout.items()}
+        | {f"per {name}": _word(outcome) for name, outcome in v.by_decay.items()}
+        for v in verdicts
+        if v.by_layout
+    }
+    return shown(pd.DataFrame.from_dict(rows, "index").fillna(""), caption, escape=False)
 
 
-def assumption_table(assumptions: Iterable[Assumption]) -> pd.DataFrame:
+def assumption_table(assumptions: Iterable[Assumption]) -> str:
     """One row an assumption: which theorem makes it, and what is run."""
     rows = {
         a.theorem: {name: "assumed" if name in a.by else "–" for name in THEOREMS}
         | {"holds": "yes" if a.holds else "no", "here": a.here}
         for a in assumptions
     }
-    return pd.DataFrame.from_dict(rows, "index")
+    return shown(pd.DataFrame.from_dict(rows, "index"))
 
 
 TIMES = {  # columns of `time_learners` with one number each, and what one of their units is
@@ -123,7 +129,7 @@ def timing_table(timings: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(columns).replace("nan", "–")
 
 
-def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -> pd.DataFrame:
+def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -> str:
     """One row a question: what was asked and expected, what was found, and on what that rests.
 
     Args:
@@ -142,7 +148,7 @@ def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -
             "found": one.words,
             "evidence": "; ".join(counts),
         }
-    return pd.DataFrame.from_dict(rows, "index")
+    return shown(pd.DataFrame.from_dict(rows, "index"))
 
 
 def _share_of(name: str, yes: int, of: int) -> str:
@@ -150,7 +156,7 @@ def _share_of(name: str, yes: int, of: int) -> str:
     return f"{yes} of {of} {name}" + (f": {rate(yes, of):.0%}" if of else "")
 
 
-def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> pd.DataFrame:
+def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
     """One row a claim: its verdict, and what changes it, by the letter of our assumption.
 
     Args:
@@ -163,7 +169,7 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> pd.DataFra
         mine = names[changed.claim == v.claim].groupby(changed.departure, sort=False).agg(", ".join)
         by = [f"{letter or 'no assumption'}: {each}" for letter, each in mine.items()]
         rows[v.claim] = {"claim": v.statement, "verdict": v.words, "changed by": "; ".join(by)}
-    return pd.DataFrame.from_dict(rows, "index")
+    return shown(pd.DataFrame.from_dict(rows, "index"))
 
 
 def departure(letter: str) -> str:
@@ -173,27 +179,6 @@ def departure(letter: str) -> str:
     if entry.variant:
         parts["To run it otherwise"] = f"Set `{entry.variant}` of an `Experiment`."
     return "\n\n".join(f"**{name}.** {text}" for name, text in parts.items())
-
-
-LEFT = 'style="text-align: left"'  # the theme and Jupyter turn cells to the right
-
-
-def html_table(
-    caption: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]], *, headed: bool = False
-) -> str:
-    """A table whose cells are HTML already; `headed` if they are words in rows that have a name."""
-    head = "".join(f'<th scope="col" {LEFT}>{_text(name)}</th>' for name in header)
-    body = "".join(f"<tr>{_row(row, headed)}</tr>" for row in rows)
-    return (
-        f'<table class="table dataframe{" words" * headed}"><caption>{_text(caption)}</caption>'
-        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-    )
-
-
-def _row(cells: tuple[str, ...], headed: bool) -> str:
-    first, *others = (f"{LEFT}>{cell}" for cell in cells)
-    name = f'<th scope="row" {first}</th>' if headed else f"<td {first}</td>"
-    return name + "".join(f"<td {cell}</td>" for cell in others)
 
 
 def _text(text: str) -> str:
@@ -206,9 +191,9 @@ def badge(text: str, outcome: str) -> str:
     return f'<span class="{BADGES[outcome]}">{text}</span>'
 
 
-def _word(outcome: Outcome | None) -> str:
-    """An outcome in a narrow cell: colour and word; nothing where nothing was judged."""
-    return badge(WORDS[outcome], outcome) if outcome else ""
+def _word(outcome: Outcome) -> str:
+    """An outcome in a narrow cell: colour and word."""
+    return badge(WORDS[outcome], outcome)
 
 
 def _share(verdict: Verdict, source: str = PUBLISHED) -> str:

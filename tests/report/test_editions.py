@@ -56,7 +56,8 @@ def test_every_line_has_a_group_and_is_counted_once(both):
     assert not both.duplicated(["group", "name"]).any()
     counts = editions.summary(both)
     assert counts.outcomes.sum() == sum(bool(one.outcome) for one in editions.first())
-    assert sum(len(editions.table(both, group)) for group in editions.GROUPS) == len(both)
+    pages = "".join(editions.table(both, group) for group in editions.GROUPS)
+    assert pages.count("<tr>") == len(both)
 
 
 @pytest.mark.parametrize(
@@ -90,4 +91,4 @@ def test_a_part_made_anew_and_what_turned_are_counted(monkeypatch):
     assert changed[changed != 0].to_dict() == {"The paper's claims": 2}
     assert counts.anew.to_dict()["Changing worlds"] == 0 < counts.anew["The paper's claims"] == 1
     assert editions.parts_anew().yes == (editions.parts_table().edition == "second").sum() == 1
-    assert [*editions.table(again, "The paper's claims").stands[:2]] == ["no", "no"]
+    assert editions.table(again, "The paper's claims").count(">no</td>") == 2

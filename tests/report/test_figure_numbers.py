@@ -10,7 +10,17 @@ from nmpcrl.claims import thresholds
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS
 from nmpcrl.claims.robustness import robustness_map
 from nmpcrl.claims.rule import Observations
-from nmpcrl.report.figures import claims, layouts, plans, remedies, results, speed, trap, trials
+from nmpcrl.report.figures import (
+    claims,
+    layouts,
+    plans,
+    remedies,
+    results,
+    speed,
+    trap,
+    trials,
+    worlds,
+)
 from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.studies.remedies import ADVISED
 from nmpcrl.study import Experiment, paper
@@ -287,6 +297,16 @@ def test_what_did_not_end_at_the_target_is_crossed_out():
     crosses = [sum(line.get_marker() == "X" for line in axes.lines) for axes in figure.axes[:2]]
     assert crosses == [0, 1]
     assert "arrives in 1 of 2 layouts after learning, in 2 " in figure.finding
+
+
+def test_a_world_that_changes_is_drawn_by_the_median_of_its_runs_and_quartiles_that_are_runs():
+    ends = [0.8, 0.9, 1.2, 1.3]
+    shares = {arm: [np.linspace(1, end, 60) for end in ends] for arm in worlds.ARMS}
+    panel = worlds.shifts(shares, 150).axes[0]
+    assert panel.get_lines()[2].get_xydata()[-1] == pytest.approx([300, np.median(ends)])
+    band = panel.collections[0].get_paths()[0].vertices[:, 1]
+    assert (band.min(), band.max()) == pytest.approx((0.8, 1.2))
+    assert "costs 105% of replanning" in worlds.shifts(shares, 150).finding
 
 
 def test_the_infinite_cost_of_a_lost_run_is_not_drawn():

@@ -41,19 +41,19 @@ def cells(table: str) -> list[list[str]]:
 
 def test_a_verdict_shows_its_share_and_interval_beside_that_of_other_runs():
     known, own = verdict(NOT), verdict(PARTLY, share=0.75, interval=(0.5, 0.875))
-    header, row = cells(tables.verdict_table([known], "All of it.", [own]))
-    assert header == ["The paper claims", "Published", "Runs of this page"]
-    assert row[1:] == [NOT, f"{PARTLY}|75% [50%, 88%]"]
-    assert cells(tables.verdict_table([own], ""))[1][1] == row[2]
-    assert "a &lt; b &amp; c." in tables.verdict_table([own], "<caption>")
-    assert "&lt;caption&gt;" in tables.verdict_table([], "<caption>")
+    shown = tables.verdict_table([known], "<All of it.>", [own])
+    header, row = cells(shown)
+    assert header == ["", "the paper claims", "published", "runs of this page"]
+    assert row == ["C1", "a < b & c.", NOT, f"{PARTLY}|75% [50%, 88%]"]
+    assert cells(tables.verdict_table([own], ""))[1][2] == row[3]
+    assert "<caption>&lt;All of it.&gt;</caption>" in shown
 
 
 def test_a_claim_is_shown_in_each_layout_and_decay_in_colour_and_in_words():
     parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
     table = tables.layout_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
     assert cells(table) == [
-        ["Claim", "All", "A", "B", "per step"],
+        ["", "all", "A", "B", "per step"],
         ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
     ]
     for outcome in (PARTLY, REPRODUCED, NOT, UNDECIDABLE):
@@ -63,10 +63,10 @@ def test_a_claim_is_shown_in_each_layout_and_decay_in_colour_and_in_words():
 def test_what_changes_a_verdict_is_named_by_departure_with_a_star_where_it_is_sure():
     rows = [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)]
     changed = pd.DataFrame(rows, columns=["departure", "variant", "claim", "p"])
-    row = tables.dependence([verdict(PARTLY)], changed).loc["C1"]
+    row = cells(tables.dependence([verdict(PARTLY)], changed))[1]
     by = "B: layout E*, layout F; no assumption: N = 5"
-    assert [*row] == ["a < b & c.", PARTLY, by]
-    assert tables.dependence([verdict(NOT)], changed[:0]).loc["C1", "changed by"] == ""
+    assert row == ["C1", "a < b & c.", PARTLY, by]
+    assert cells(tables.dependence([verdict(NOT)], changed[:0]))[1][-1] == ""
 
 
 def test_a_drawn_claim_has_count_interval_outcome_and_what_was_expected():
@@ -105,8 +105,9 @@ def test_runs_are_split_by_whether_theta_c_has_closed_a_gap_where_there_is_one(m
     ],
 )  # fmt: skip
 def test_an_answer_comes_with_its_question_its_evidence_and_what_was_expected(answer, shown):
-    asked, row = REMEDIES.asked["guard"], tables.answer_table([answer], REMEDIES.asked).loc["guard"]
-    assert [*row] == [f"{asked.pilot} {asked.question}".strip(), "confirmed", *shown]
+    asked, row = REMEDIES.asked["guard"], cells(tables.answer_table([answer], REMEDIES.asked))[1]
+    question = f"{asked.pilot} {asked.question}".strip()
+    assert row == ["guard", question, "confirmed", *shown]
 
 
 def advised(entry, word, part=SHORT, gain=(0.8, 0.7, 0.9), share=0.9, setting=""):

@@ -12,7 +12,7 @@ from matplotlib.ticker import PercentFormatter
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.analysis.statistics import interquartile_mean
-from nmpcrl.report.figures.axes import below, interval, middle_half, over_episodes
+from nmpcrl.report.figures.axes import below, interval, over_episodes
 from nmpcrl.report.figures.style import (
     BAND,
     INK,
@@ -100,7 +100,9 @@ def shifts(shares: Mapping[str, Sequence[Sequence[float]]], change: int) -> Draw
     runs = {arm: np.array([*shares[arm]], float) for arm in ARMS}
     for arm, look in ARMS.items():
         episodes = EVERY * np.arange(1, runs[arm].shape[1] + 1)
-        middle_half(axes, episodes, runs[arm], look["color"], "inverted_cdf", **_but_color(look))
+        quartiles = np.quantile(runs[arm], (0.25, 0.75), axis=0, method="inverted_cdf")
+        axes.fill_between(episodes, *quartiles, color=look["color"], alpha=0.15, linewidth=0)
+        axes.plot(episodes, np.median(runs[arm], axis=0), **look)
     axes.yaxis.set_major_formatter(PercentFormatter(1, 0))
     ylabel = r"cost over that of $\theta_\mathrm{init}$"
     axes.set(ylabel=ylabel, xlim=(0, episodes[-1]), ylim=(None, DEAREST))
@@ -112,10 +114,6 @@ def shifts(shares: Mapping[str, Sequence[Sequence[float]]], change: int) -> Draw
         f"At the end ES costs {told:.0%} of replanning without learning if it knows of the"
         f" change, and {never:.0%} if it does not",
     )
-
-
-def _but_color(look: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in look.items() if name != "color"}
 
 
 @page
