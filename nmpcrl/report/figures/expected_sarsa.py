@@ -104,7 +104,7 @@ def two_costs(runs: Runs[Records]) -> Drawn:
         logarithmic_if_wide(*row)
     legend(figure, runs.values_of("learner"))
     fall = frozen_fall(runs)
-    return titled(figure, f"With noise, the cost of a frozen θ falls by up to {fall:.0%} by itself")
+    return titled(figure, f"With noise, the cost falls by up to {fall:.0%} without learning")
 
 
 def frozen_fall(runs: Runs[Records]) -> float:
