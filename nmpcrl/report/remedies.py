@@ -105,7 +105,7 @@ def named_table(table: pd.DataFrame, part: str) -> pd.DataFrame:
     for row in sorted(rows(found), key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds)):
         runs = found[found.entry == row.entry]
         ended = solved(runs)
-        each = shares(runs).reindex(ended.index).map("{:.2f}".format)
+        each = shares(runs).reindex(ended.index).map("{:.2f}".format).replace("-inf", "fails")
         count = {"solved": f"{ended.sum()} of {len(ended)}", "CPU time [s]": f"{row.seconds:.1f}"}
         shown[row.name] = (each + np.where(ended, "", "*")).to_dict() | count
     return pd.DataFrame.from_dict(shown, "index")
