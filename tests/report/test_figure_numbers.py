@@ -266,7 +266,7 @@ def test_a_claim_keeps_its_verdict_between_the_thresholds_named():
 
 def test_the_penalty_begins_where_it_was_computed_by_hand():
     figure = plans.penalty_gap(paper.task("A"), np.array([0.001, 0.35]), np.array([3.0, 1.0]))
-    legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend == ["the NMPC keeps 1.251 m", "the penalty begins at 1.452 m"]
     assert "theta_c = 0.35 has the lowest cost" in figure.finding
 

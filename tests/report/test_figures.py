@@ -246,6 +246,24 @@ def test_a_figure_can_be_read_on_a_page(draw):
             assert to_hex(handle.get_color()) == to_hex(style.LOOKS[handle.get_label()].color)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "unlike",
+    [
+        {"episodes": 1},
+        {"alpha": 1e-2},  # diverges
+        {"learner": "frozen"},
+        {"layout": ((0.5, 2.2), (3, 7)), "target": (6, 8, 0)},
+    ],
+    ids=str,
+)
+def test_any_run_has_a_page(unlike):
+    one = replace(Experiment(episodes=3, steps=5, evaluate_every=1), **unlike)
+    figure = run_page(run(one), None if one.learner == "frozen" else run(frozen_arm(one)))
+    assert flaws(figure) == []
+    assert figure.finding.startswith(f"{one.learner}: cost without noise ")
+
+
 def test_every_figure_is_drawn_above():
     names = [f"{figures.__name__}.{one.name}" for one in iter_modules(figures.__path__)]
     drawing = {

@@ -167,7 +167,7 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Drawn:
     above.axvline(keeps, color=WINE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
     above.axvline(begins, color=TEAL, ls="-.", label=f"the penalty begins at {begins:.3f} m")
     above.set(xlabel="distance to a centre [m]", ylabel="penalty of a step [cost]")
-    above.legend(loc="upper right")
+    below(figure, above.get_legend_handles_labels()[0])
     order = np.argsort(theta_c)
     low.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
     low.axvline(task.margin, color=TEAL, ls="-.", lw=1)

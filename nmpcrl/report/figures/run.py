@@ -95,7 +95,9 @@ def _theta(axes: Axes, records: Records) -> None:
         axes.plot(values[:, i], color=shade, linestyle=line, label=symbols[i])
     axes.set(title=f"{symbols[named[0]]} moves by {change.max():.2g}", ylabel="component of θ [-]")
     if change.max() > WIDE:
-        axes.set_yscale("symlog", linthresh=1, linscale=3)
+        decades = np.log10(np.nanmax(np.abs(values)))
+        axes.set_yscale("symlog", linthresh=1, linscale=max(3, decades / 2))
+        axes.yaxis.get_major_locator().set_params(numticks=7)  # type: ignore[call-arg]
     axes.margins(y=0.9)
     axes.legend(loc="upper center", ncols=2, handlelength=1.5, columnspacing=1)
 
