@@ -64,7 +64,7 @@ OF_EXTRA = {  # what runs with each
     "": EXAMPLE + EXAMPLE.replace(', solver="fatrop"', ""),
     "[gymnasium]": EXAMPLE + """
 from nmpcrl.learning import as_gymnasium
-env = as_gymnasium(nmpc, plant=plant, start=[0.0])
+env = as_gymnasium(nmpc, plant=problem.plant(), start=[0.0])
 result.policy.predict(env.reset(seed=0)[0])
 """,
     "[torch]": EXAMPLE + """

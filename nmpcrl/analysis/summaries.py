@@ -1,9 +1,7 @@
 """Summaries of runs: made from stored or trained runs, here or on any executor, and stored here."""
 
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.control import Riccati
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.limits import need_numba
 from nmpcrl.study.provenance import summary_key
 from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.store import RUNS, Store, refused, train
@@ -16,8 +14,6 @@ def make(experiment: Experiment, *, afresh: bool = False) -> RunSummary:
 
     A run that needs another solver than its experiment names is refused.
     """
-    if experiment.solver == Riccati.name:
-        need_numba("without it riccati solves nothing")
     records = (None if afresh else RUNS.read(experiment)) or train(experiment)
     if why := refused(experiment, records.facts):
         raise Refusal(f"it is {why}")

@@ -54,9 +54,7 @@ def time_learners(
     paper's 300 x 130 steps), hours_paper (Table II; nan for DES); and of `Ratio` to ES: ratio,
     ratio_low, ratio_high and waited (nan where ES is not among the learners).
     """
-    runs = {
-        (solver, learner): _steps(learner, solver) for solver in solvers for learner in learners
-    }
+    runs = {(solver, one): _steps(one, solver) for solver in solvers for one in learners}
     times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
     names, rng = list(runs), np.random.default_rng(0)
     for first in range(0, SETTLED + steps, TURN):

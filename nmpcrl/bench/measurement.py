@@ -15,7 +15,7 @@ import psutil
 
 from nmpcrl.bench.learners import PROCESSES, time_learners_afresh
 from nmpcrl.bench.paired import IDLE
-from nmpcrl.study import limits, lock, paper, provenance
+from nmpcrl.study import lock, paper, provenance
 from nmpcrl.study.files import check_folder, folder, write_json
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import one_of
@@ -55,7 +55,6 @@ def read_or_measure(length: str = "full", *, calm: bool = False) -> Measurement:
     Raises:
         ParameterError: there is no such length.
         StoreError: it could not be stored; nothing is measured.
-        Refusal: numba is not installed.
     """
     check(length)
     kept = stored()
@@ -65,7 +64,6 @@ def read_or_measure(length: str = "full", *, calm: bool = False) -> Measurement:
 def measure(length: str) -> Measurement:
     """Time the learners, and keep the table in `path`; raises as `read_or_measure`."""
     check(length)
-    limits.need_numba("what is measured is the machine code that it compiles")
     check_folder()
     others, began = psutil.cpu_percent(1.0) / 100, time.perf_counter()
     found = Measurement(

@@ -62,12 +62,8 @@ def paired_ratio(
     """
     low, high = _interval(work, reference)
     ran = (work.sum() + reference.sum()) / (passed.sum() + reference_passed.sum())
-    return Ratio(
-        float(work.sum() / reference.sum()),
-        low / (1 + PLACEMENT),
-        high * (1 + PLACEMENT),
-        max(0.0, 1 - float(ran)),
-    )
+    value, waited = float(work.sum() / reference.sum()), max(0.0, 1 - float(ran))
+    return Ratio(value, low / (1 + PLACEMENT), high * (1 + PLACEMENT), waited)
 
 
 def pooled(ratios: Sequence[Ratio]) -> Ratio:

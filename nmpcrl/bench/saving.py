@@ -74,11 +74,6 @@ def saving(timings: pd.DataFrame) -> Saving:
     times = timings.set_index(["learner", "solver"])
     rdes = times.loc["RDES"].sort_values("ms_per_solve")
     es = times.loc["ES"].loc[rdes.index]
-    columns = {
-        "solve": rdes.ms_per_solve,
-        "warm": es.ms_per_solve / rdes.ms_per_solve,
-        "network": rdes.ms_per_fit,
-        "rest": es.ms_per_rest,
-        "rest_rdes": rdes.ms_per_rest,
-    }
-    return Saving(**{name: column.to_numpy(float) for name, column in columns.items()})
+    warm, rests = es.ms_per_solve / rdes.ms_per_solve, (es.ms_per_rest, rdes.ms_per_rest)
+    columns = rdes.ms_per_solve, warm, rdes.ms_per_fit, *rests
+    return Saving(*(column.to_numpy(float) for column in columns))

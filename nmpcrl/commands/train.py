@@ -62,15 +62,13 @@ def train(yes: bool, **values: Any) -> None:
     from tqdm import tqdm
 
     from nmpcrl.study import Experiment, fetch
-    from nmpcrl.study.limits import afford, need_numba
+    from nmpcrl.study.limits import afford
     from nmpcrl.study.store import RUNS
 
     experiment = Experiment(**values)
     path = RUNS.path_of(experiment)
     stored = path.is_file()
     if not stored:
-        if experiment.box == "soft":
-            need_numba("only riccati, which it compiles, keeps to a soft box")
         afford([experiment], sure=yes)
     name = experiment.learner
     with tqdm(total=experiment.episodes, unit="ep", desc=name, disable=stored) as bar:

@@ -32,10 +32,6 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
       nmpcrl wasm --plant my_robot:plant --task my_robot:task --out robot.wasm
       nmpcrl wasm --problem my_reactor:problem --out reactor.wasm
     """
-    from nmpcrl.study.limits import need_numba
-
-    need_numba("its LLVM compiles to WebAssembly")
-
     from nmpcrl.control import Nmpc, Plant, Problem, Task
     from nmpcrl.control import browser as alone
     from nmpcrl.control.codegen.source import CannotCompile

@@ -16,14 +16,14 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.batch import Batch, solve_many, stage_data, table
 from nmpcrl.control.bending import Bending
-from nmpcrl.control.content import Described, key_of
+from nmpcrl.control.content import Described
 from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.sensitivity import Gradient, Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, short
-from nmpcrl.control.solvers import Asked, Fatrop, Riccati, Solver, solver_of
+from nmpcrl.control.solvers import Asked, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
@@ -267,12 +267,6 @@ class Nmpc(Described):
         """
         variant = self._variant(solution)
         return float(variant.dense(Sensitivity.kkt_residual, solution, relative=relative))
-
-    @property
-    def key(self) -> str:
-        """As in `Problem`; without numba, riccati has the key of fatrop, which then solves."""
-        solver = self.solver if self.solver.available else Fatrop(self.solver.tolerance)
-        return key_of(type(self), self.__getstate__() | {"solver": solver})
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

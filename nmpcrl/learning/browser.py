@@ -96,7 +96,7 @@ def module(of: Plant | Problem, task: Task | None = None) -> bytes:
     Made once, in about a minute, and kept with the machine code.
 
     Raises:
-        CannotCompile: numba is missing, or the plant or task holds an operation that is not known.
+        CannotCompile: the plant or the task holds an operation that is not known.
         RuntimeError: numba cannot compile this, or it calls more than every host has.
     """
     learning = {}

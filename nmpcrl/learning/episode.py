@@ -139,7 +139,7 @@ class Loop:
         """Compile it, if that was not done before on this machine.
 
         Raises:
-            CannotCompile: the loop does not know a part, or numba is missing.
+            CannotCompile: the loop does not know a part.
         """
         learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
         step, own = _known_step(learner, nmpc), type(nmpc) is Nmpc and trainer.controller is nmpc

@@ -27,7 +27,7 @@ def interpreted(of: Problem) -> ModuleType:
     Replace one of them, `plain.factorise = mine`, and the others call yours.
 
     Raises:
-        CannotCompile: numba is missing.
+        CannotCompile: the problem holds an operation that is not known.
     """
     find = machine_code(of).py_func
     kernel = find.__globals__["solve"].py_func.__globals__

@@ -5,8 +5,7 @@ from collections.abc import Iterable
 
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import LEARNERS, NETWORKS
-from nmpcrl.study.provenance import environment
-from nmpcrl.study.refusal import ParameterError, Refusal
+from nmpcrl.study.refusal import ParameterError
 
 HOURS = 24.0  # of one core; the whole study takes about 5
 STEPS = 4_000_000  # of one run, whose tables then take about 4 GB of memory
@@ -56,9 +55,3 @@ def afford(experiments: Iterable[Experiment], *, sure: bool = False) -> None:
             f" {hours:,.0f} hours of one core; {HOURS:.0f} are allowed, and more with {SURE}=1 in"
             " the environment"
         )
-
-
-def need_numba(why: str) -> None:
-    """Refuse work that needs machine code where numba is missing; `why` is a clause."""
-    if environment()["numba"] == "absent":
-        raise Refusal(f"numba is not installed, and {why}: `pip install numba`")

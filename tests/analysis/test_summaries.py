@@ -9,7 +9,7 @@ from builders import assert_same_numbers
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries, make
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.study import Experiment, fetch, limits, lock, provenance, run, store, sweep
+from nmpcrl.study import Experiment, fetch, lock, provenance, run, store, sweep
 from nmpcrl.study.jobs import Failed
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
@@ -88,6 +88,3 @@ def test_a_run_that_fails_is_named_and_stops_no_other_one(monkeypatch, capsys):
     assert [SUMMARIES.is_stored(e) for e in THREE] == [True, False, True]
     assert list(here(THREE, strict=False)) == [THREE[0], THREE[2]]
     assert why in capsys.readouterr().err
-    monkeypatch.setattr(limits, "environment", lambda: {"numba": "absent"})
-    with pytest.raises(Failed, match="Refusal: numba is not installed"):
-        here(THREE)

@@ -10,7 +10,7 @@ from builders import raising
 
 from nmpcrl.claims.published import Damaged
 from nmpcrl.commands.refusals import INSTEAD, sentence
-from nmpcrl.study import Experiment, StoreError, fetch, limits
+from nmpcrl.study import Experiment, StoreError, fetch
 
 TRAIN, STUDY = "train --episodes 1 --steps 4 ", "study "
 REFUSALS = [  # what is typed, and what the refusal names
@@ -84,16 +84,6 @@ def test_a_file_in_the_place_of_the_folder_of_runs(command, tmp_path, line):
     (tmp_path / "runs").write_text("")
     said = refused(command(*line.split()))
     assert f"NMPCRL_RUNS = {str(tmp_path / 'runs')!r} must be a folder" in said
-
-
-@pytest.mark.parametrize("line", ["bench --again --short", "wasm", "train --box soft --episodes 1"])
-def test_what_needs_machine_code_says_so_at_once_without_numba(
-    command, monkeypatch, tmp_path, line
-):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(limits, "environment", lambda: {"numba": "absent"})
-    assert "numba is not installed, and " in refused(command(*line.split()))
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

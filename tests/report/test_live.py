@@ -64,8 +64,8 @@ def test_without_a_compiler_or_scripts_there_is_a_sentence(figure, tmp_path, mon
     with monkeypatch.context() as patch:
         patch.setenv("NMPCRL_LIVE", str(tmp_path / "nowhere"))
         assert "NMPCRL_LIVE" in FIGURES[figure]().data
-    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
-    said = "<p>There is no live figure here: numba is not installed.</p>"
+    monkeypatch.setattr(browser, "module", raising(CannotCompile("OP_ERFINV is not known")))
+    said = "<p>There is no live figure here: OP_ERFINV is not known.</p>"
     assert FIGURES[figure]().data == said
 
 

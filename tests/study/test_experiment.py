@@ -6,10 +6,11 @@ from itertools import count, product
 
 import numpy as np
 import pytest
-from builders import assert_same_numbers
+from builders import assert_same_numbers, raising
 
 from nmpcrl.control import Nmpc, SolverError
-from nmpcrl.control.codegen import jit
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.control.solvers import riccati
 from nmpcrl.learning.episode import Loop
 from nmpcrl.study import Experiment, ParameterError, paper, run
 from nmpcrl.study.design import FIELDS
@@ -219,7 +220,7 @@ def test_the_facts_say_which_solver_found_the_plans(monkeypatch):
     short = {"learner": "frozen", "episodes": 1, "steps": 3}
     for name in ("riccati", "fatrop"):
         assert run(Experiment(**short, solver=name)).facts["solver"] == name
-    monkeypatch.setattr(jit, "numba_version", lambda: None)
+    monkeypatch.setattr(riccati, "load", raising(CannotCompile("no")))
     with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
         records = run(Experiment(**short))
     assert records.experiment["solver"] == "riccati"

@@ -12,8 +12,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -45,7 +44,7 @@ def compiled(function: ca.Function, *, returned: bool = False) -> Callable[..., 
     """`function` as machine code, called as `source` says, with contiguous arrays.
 
     Raises:
-        CannotCompile: numba is missing, or an operation is not known.
+        CannotCompile: an operation is not known.
     """
     inputs = [function.size2_in(i) for i in range(function.n_in())]
     outputs = [] if returned else [function.size2_out(i) for i in range(function.n_out())]
@@ -80,24 +79,9 @@ def callable_of(function: ca.Function, *, scalar: bool = False) -> Callable[...,
     return call
 
 
-@cache
-def numba_version() -> str | None:
-    """The version of numba that is installed; None where there is none."""
-    try:
-        return version("numba")
-    except PackageNotFoundError:
-        return None
-
-
 def key(name: str, texts: Mapping[str, str], *more: object) -> str:
-    """`name` and a hash of the texts and of all versions on which compiled code depends.
-
-    Raises:
-        CannotCompile: numba is not installed.
-    """
-    if numba_version() is None:
-        raise CannotCompile("numba is not installed")
-    depends = [sorted(texts.items()), sys.version, numba_version(), platform.machine(), *more]
+    """`name` and a hash of the texts and of all versions on which compiled code depends."""
+    depends = [sorted(texts.items()), sys.version, version("numba"), platform.machine(), *more]
     return f"{name}_{hashlib.sha256(repr(depends).encode()).hexdigest()[:16]}"
 
 
@@ -110,7 +94,7 @@ def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
         notice: said on standard error while something is compiled.
 
     Raises:
-        CannotCompile: numba is not installed, or cannot compile this.
+        CannotCompile: numba cannot compile this.
         OSError: a temporary folder cannot hold it either.
     """
     package = key(name, texts)

@@ -57,7 +57,7 @@ BINARY = {
 
 
 class CannotCompile(Exception):
-    """An expression holds what cannot be compiled, or numba is missing: the message says which."""
+    """An expression holds what cannot be compiled; the message says what."""
 
 
 def source(

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.codegen import jit
 from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.ocp import Ocp
@@ -63,7 +62,7 @@ def machine_code(problem: Problem, entry: str = "find") -> Any:
     """The function `find.find` or `slopes.slopes`, compiled for a problem once.
 
     Raises:
-        CannotCompile: numba is missing, or the problem holds an operation that is not known.
+        CannotCompile: the problem holds an operation that is not known.
     """
     if entry not in problem.machine_code:
         texts = {name: TEXTS[name] for name in ("codes", "kernel", entry)}
@@ -85,11 +84,6 @@ class Riccati(Solver):
         super().__post_init__()
         if positive_integer("starts", self.starts) > MOST:
             raise ValueError(f"starts = {self.starts} must be at most {MOST}")
-
-    @property
-    def available(self) -> bool:
-        """Whether numba is installed."""
-        return jit.numba_version() is not None
 
     def prepare(self, ocp: Ocp) -> Prepared:
         """The compiled solver; fatrop, with a warning, where it cannot be compiled."""

@@ -46,11 +46,6 @@ class Solver(ABC):
             raise ValueError(f"tolerance = {self.tolerance} must lie in {allowed}")
         object.__setattr__(self, "tolerance", float(self.tolerance))
 
-    @property
-    def available(self) -> bool:
-        """Whether the packages that the solver needs are installed."""
-        return True
-
     @abstractmethod
     def prepare(self, ocp: Ocp) -> Prepared:
         """Get ready for a problem."""

@@ -115,7 +115,7 @@ def test_other_text_or_another_numba_is_other_code(cache, monkeypatch):
     texts = {"__init__": "from .part import x\n", "part": "x = 1\n"}
     assert jit.load("tiny", texts) is jit.load("tiny", texts)
     assert jit.load("tiny", texts | {"part": "x = 2\n"}).x == 2
-    monkeypatch.setattr(jit, "numba_version", lambda: "0.1")
+    monkeypatch.setattr(jit, "version", lambda _: "0.1")
     assert jit.load("tiny", texts).x == 1
     assert len(packages(cache)) == 3
 

@@ -39,7 +39,6 @@ def from_texts(texts: Mapping[str, str]) -> bytes:
     """The module that exports every function in the `EXPORTS` of the modules with these texts.
 
     Raises:
-        CannotCompile: numba is not installed.
         RuntimeError: numba cannot compile them, or they call what a browser does not have.
     """
     own = [path.read_text("utf-8") for path in sorted(Path(__file__).parent.glob("*.*"))]
