@@ -55,8 +55,8 @@ def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati):
 
 
 def test_when_it_gives_up_it_says_what_it_tried(monkeypatch):
-    def no_plan(_program, state, theta, *_, **__):
-        raise SolverError("Ipopt found none", state, theta)
+    def no_plan(_program, asked):
+        raise SolverError("Ipopt found none", asked.state, asked.theta)
 
     monkeypatch.setattr(Program, "solve", no_plan)
     with pytest.raises(SolverError) as caught:
