@@ -32,6 +32,31 @@ def test_learners_that_are_timed_afresh_are_pooled_over_the_processes(monkeypatc
     assert 2 * 0.1 + es["ms_per_rest"] == pytest.approx(es["ms_per_step"])
 
 
+def measurements(seed: int) -> list[pd.DataFrame]:
+    """Ten repetitions, of which each says how sure it is; they come apart by as much."""
+    rng, tables = np.random.default_rng(seed), []
+    for shift in rng.normal(0, 0.01, 10):
+        rows = [("ipopt", "ES", 1.0, 1.0, 1.0), ("ipopt", "RDES", *np.exp(shift + WIDE) * 0.6)]
+        table = pd.DataFrame(
+            rows, columns=["solver", "learner", "ratio", "ratio_low", "ratio_high"]
+        )
+        parts = {"solves": 1.0, "ms_per_solve": 0.1, "ms_per_fit": np.nan, "ms_per_rest": 0.1}
+        tables.append(table.assign(ms_per_step=table.ratio, waited=0.0, **parts))
+    return tables
+
+
+WIDE = np.array([0.0, -0.02, 0.02])  # of a repetition's own interval: two standard errors
+
+
+def test_repetitions_say_how_many_of_their_intervals_hold_the_whole():
+    found = [processes.repeated(measurements(seed)).iloc[1] for seed in range(20)]
+    assert {one.repetitions for one in found} == {10}
+    assert np.mean([one.inside for one in found]) == pytest.approx(9.5, abs=0.4)
+    held = [one.ratio_low <= 0.6 <= one.ratio_high for one in found]
+    assert np.mean(held) >= 0.85
+    assert all(one.ratio == pytest.approx(one.ms_per_step) for one in found)
+
+
 def test_at_least_nine_of_ten_published_repetitions_hold_what_they_come_to():
     timings = published.load().timings
     assert set(timings.repetitions) == {learners.REPETITIONS}

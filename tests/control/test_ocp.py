@@ -97,13 +97,6 @@ def test_only_a_soft_box_is_left_for_a_target_behind_it(solver, theta):
     assert left.value < kept.value
 
 
-def test_the_first_state_may_lie_outside_the_box(robot, theta):
-    """Noise can push it there; it is enough that the next one is back inside."""
-    solution = robot.solve(np.array([-3.05, 2.0, 0.0]), theta)
-    assert solution.states[0, 0] == pytest.approx(-3.05)
-    assert solution.states[1, 0] >= -3
-
-
 def test_bellmans_equation_ties_one_horizon_to_the_next(robot, draw, solver):
     """Q_N(s, a) = L(s, a) + omega sigma_0 + gamma V_{N-1}(f(s, a)), if the plans are the same."""
     shorter, same = paper.nmpc(horizon=robot.horizon - 1, solver=solver), 0
