@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import traceback
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
@@ -186,6 +187,8 @@ def fails(project: Path, tests: str) -> bool:
                 os.dup2(said.fileno(), 1), os.dup2(said.fileno(), 2)
             paths = [f"tests/{one}" for one in tests.split()]
             code = import_module("pytest").main(["-xq", "-pno:cacheprovider", "-m", FAST, *paths])
+        except BaseException:
+            traceback.print_exc()  # into the file that the error below shows
         finally:
             os._exit(code)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

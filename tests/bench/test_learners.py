@@ -29,23 +29,9 @@ def test_a_ratio_is_taken_within_one_solver():
         learners.ratio(times, "ipopt", "GES")
 
 
-def test_es_is_as_fast_as_itself_and_few_steps_have_no_interval(timings):
-    table = timings.set_index("learner")
-    assert table.ratio["ES"] == 1
-    assert table[["ratio_low", "ratio_high"]].isna().all(axis=None)
-    assert table.waited.between(0, 1).all()
-
-
 def test_the_parts_of_a_step_add_up_to_the_processor_s_time_however_long_it_waited():
     steps = [[2.0, 0.4, 0.2, 2.0, 1.0]] * 2 + [[2.0, 8.0, 0.2, 10.0, 5.0]]  # half was another's
     made = learners._means(np.array(steps).T)
     assert made["ms_per_step"] == pytest.approx(7e3 / 3)
     told = made["solves"] * made["ms_per_solve"] + made["ms_per_fit"] + made["ms_per_rest"]
     assert told == pytest.approx(made["ms_per_step"])
-
-
-def test_the_ratio_is_what_the_times_of_the_same_table_divide_to(timings):
-    step = timings.set_index(["solver", "learner"]).ms_per_step
-    for solver, learner in step.index:
-        stated = learners.ratio(timings, solver, learner).value
-        assert stated == pytest.approx(step[solver, learner] / step[solver, "ES"])

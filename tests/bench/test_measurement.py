@@ -1,12 +1,9 @@
 """When the timing table is read and when it is measured, and what the command prints."""
 
-import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
-from nmpcrl.bench import measurement, solves
-from nmpcrl.commands import main
+from nmpcrl.bench import measurement
 from nmpcrl.study.files import folder
 
 
@@ -89,21 +86,3 @@ def test_what_was_timed_on_a_busy_machine_is_timed_again_where_calm_is_asked_for
     call()
     call()
     assert counted == ["short", "short"]
-
-
-def command(*words):
-    done = CliRunner().invoke(main, ["bench", *words])
-    assert done.exit_code == 0, done.output
-    return done.stdout
-
-
-def test_the_command_prints_both_tables_and_measures_again_only_when_told(counted, monkeypatch):
-    monkeypatch.setattr(solves, "compare", lambda *_: pd.DataFrame({"median": [np.pi]}, ["fatrop"]))
-    shown = command("--short")
-    assert sum(" RDES " in line for line in shown.splitlines()) == 3
-    assert "fatrop    3.14" in shown
-    assert f"{measurement.path()}: short, " in shown
-    command("--smoke")
-    assert counted == ["short"]
-    command("--smoke", "--again")
-    assert counted == ["short", "smoke"]

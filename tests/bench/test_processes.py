@@ -49,7 +49,7 @@ WIDE = np.array([0.0, -0.02, 0.02])  # of a repetition's own interval: two stand
 
 
 def test_repetitions_say_how_many_of_their_intervals_hold_the_whole():
-    found = [processes.repeated(measurements(seed)).iloc[1] for seed in range(20)]
+    found = [learners.repeated(measurements(seed)).iloc[1] for seed in range(20)]
     assert {one.repetitions for one in found} == {10}
     assert np.mean([one.inside for one in found]) == pytest.approx(9.5, abs=0.4)
     held = [one.ratio_low <= 0.6 <= one.ratio_high for one in found]

@@ -81,11 +81,3 @@ def test_a_dearer_plan_is_worse_and_none_a_failure_after_which_a_solver_starts_a
     assert table.failed["fails"] == pytest.approx(1 / 3)  # of those after the first
     assert warm_starts[2] is None
     assert warm_starts[3] is not None
-
-
-def test_without_noise_the_loop_is_the_policy_s_own(nmpc):
-    rng = np.random.default_rng(0)
-    (_, first, _), (state, _, _) = solves.closed_loop(nmpc, 0.0, rng, 2)
-    assert state == pytest.approx(nmpc.plant.step(nmpc.task.start, first.action))
-    *_, (noisy, _, _) = solves.closed_loop(nmpc, 1.0, rng, 2)
-    assert np.abs(noisy - state).max() > 1e-3
