@@ -1,5 +1,6 @@
 """What figures are made of: maps, axes over episodes, curves of runs, logarithmic axes, legends."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -22,7 +23,6 @@ from nmpcrl.report.figures.style import (
     WIDTH,
     Drawn,
     hatched,
-    in_words,
     subplots,
 )
 from nmpcrl.study.records import Records
@@ -184,8 +184,9 @@ def jitter(count: int, width: float) -> Vector:
 def below(figure: Drawn, handles: Sequence[Any], labels: Sequence[str] | None = None) -> None:
     """A legend below all panels, in as many columns as there is room for."""
     names = [str(handle.get_label()) for handle in handles] if labels is None else [*labels]
-    widest = 4.5 + 0.58 * max(len(in_words(name)) for name in names)  # in letters of 10 points
-    columns = max(1, int(7.2 * WIDTH / widest))
+    plain_names = (re.sub(r"[${}_^]", "", re.sub(r"\\[a-zA-Z]+", "x", name)) for name in names)
+    widest = 4.8 + 0.56 * max(map(len, plain_names))  # in letters of 10 points, with its line
+    columns = max(1, int((7.2 * WIDTH + 2) / widest))  # nothing stands after the last
     figure.legend(handles, names, loc="outside lower left", ncols=columns, alignment="left")
 
 
