@@ -23,7 +23,7 @@ summarise(run(Experiment("{learner}", episodes=1, steps=3)))
     ("script", "needed"),
     [
         (f"import {', '.join(LIGHT)}", []),
-        ("import nmpcrl.claims.evidence", ["pandas", "scipy.stats"]),
+        ("import nmpcrl.claims.published", ["pandas", "scipy.stats"]),
         (TRAIN.format(learner="ES"), ["numba"]),
         (TRAIN.format(learner="RDES"), ["torch", "numba"]),
     ],

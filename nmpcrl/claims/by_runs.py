@@ -4,7 +4,7 @@ Three classes ask three questions of the numbers. The answer is missing where th
 """
 
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import astuple, dataclass, field, replace
 from typing import Any, ClassVar, TypeAlias
 
@@ -35,7 +35,6 @@ class RunClaim(Claim):
     nothing: float = 0.0  #: the number of a run without the effect
     short: str = ""  #: the statement in the head of a column
     label: str = ""  #: of the axis with the numbers
-    linear_to: float = 0.0  #: the axis is linear up to this size, and logarithmic above
     borders: Vector = field(default_factory=lambda: np.empty(0))  #: others, for `at_borders`
     holds: ClassVar[Callable[..., Any]] = operator.le  #: of a number and a border, is it yes?
 
@@ -116,33 +115,23 @@ class Contrast(RunClaim):
 
     def judge(self, observed: Observations) -> Verdict:
         """See `RunClaim.judge`; each half of the claim is counted, too."""
-        borders = {self.wrong: self.threshold, self.worst: np.finfo(float).max}
         values = self.measure(observed.runs, observed.paths)
-        first, second = self.learners
-        return replace(super().judge(observed), halves=halves((first, second), values, borders))
+        return replace(super().judge(observed), halves=tuple(self.split(values)))
+
+    def split(self, values: Values) -> Iterator[Halves]:
+        """Both halves for each decay of the noise, by the claim's own border and then `worst`."""
+        learners = self.learners[0], self.learners[1]
+        for wrong, border in ((self.wrong, self.threshold), (self.worst, np.finfo(float).max)):
+            for decay, known in values.dropna().groupby(level="decay", sort=False):
+                first, second = (known[name] > border for name in learners)
+                counts = int(first.sum()), int(second.sum())
+                against, apart = int((second & ~first).sum()), int((first != second).sum())
+                yield Halves(learners, wrong, str(decay), len(known), counts, against, apart)
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""
         first, second = (values[name] for name in values)
         return _known((first > border) & (second <= border), first.where(second.notna()))
-
-
-def halves(
-    learners: tuple[str, str], values: Values, borders: Mapping[str, float]
-) -> tuple[Halves, ...]:
-    """Both halves of a contrast for each decay of the noise.
-
-    `borders` have, by the way to go wrong, the number above which a run does; the claim's own
-    first.
-    """
-    found = []
-    for wrong, border in borders.items():
-        for decay, known in values.dropna().groupby(level="decay", sort=False):
-            first, second = (known[name] > border for name in learners)
-            counts = int(first.sum()), int(second.sum())
-            against, apart = int((second & ~first).sum()), int((first != second).sum())
-            found.append(Halves(learners, wrong, str(decay), len(known), counts, against, apart))
-    return tuple(found)
 
 
 def _long(values: Values) -> pd.Series:

@@ -4,8 +4,6 @@ A gap that the first rollout goes through closes at a theta_c that is known befo
 (`trajectory.closes_at`); the final theta_c of a run of ES or GES only after training.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,35 +24,13 @@ EARLY = 20  # episodes
 Count: TypeAlias = tuple[int, int]  # yes, of
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Counts of runs or layouts of the published study, and shares of the cost."""
+def finding(found: Published) -> "pd.Series[Any]":
+    """Counts of runs or layouts of the published study, and shares of the cost, by name.
 
-    arrived_open: Count  # runs of `LEARNERS` with open gaps that solve their layout
-    arrived_closed: Count  # such runs with a closed gap
-    open_in: tuple[str, ...]  # layouts of the runs with open gaps
-    closed_in: tuple[str, ...]  # and of those with a closed one
-    learned: float  # median reduction of the noise-free cost by runs with open gaps that solve it
-    by_hand: Count  # layouts that theta_init with theta_c = d_o solves
-    better: Count  # of these, layouts where it costs less than any run of `LEARNERS` in the end
-    saved_by_hand: float  # median of these layouts
-    lost_by_hand: tuple[float, float]  # least and largest increase of the cost in the others
-    saved_there: float  # median of the runs in the layouts that are solved
-    stopped: Count  # runs of RDES, with noise that decays per episode
-    stopped_early: int  # of these, within `EARLY` episodes
-    stopped_per_step: Count  # the same with noise that decays per step
-    early_per_step: int
-    not_there: Mapping[str, Count]  # by learner, runs that did not end at the target
-    above: Mapping[str, Count]  # runs with a higher final cost than theta_init's
-    worse: Mapping[str, Count]  # runs whose cost is higher by more than `BETTER`
-    seconds: float  # of one core, a run of ES with the compiled solver
-    hours: float  # of the robot's motion in a run
-
-
-def finding(found: Published) -> Finding | None:
-    """The finding of the published study; None if nothing is published."""
+    Counts are (yes, of). Empty if nothing is published.
+    """
     if not found.rows:
-        return None
+        return pd.Series(dtype=object)
     main = found.main.runs.assign(saved=cost_reduction(found.main.runs))
     runs = main[main.learner.isin(LEARNERS)]
     hand = pd.DataFrame.from_dict({one: _by_hand(one) for one in runs.layout.unique()}, "index")
@@ -64,27 +40,37 @@ def finding(found: Published) -> Finding | None:
     each = {name: main[main.learner == name] for name in (*LEARNERS, "TDC")}
     stopped, early = _stopped(main, "episode")
     per_step, early_per_step = _stopped(main, "step")
-    return Finding(
-        arrived_open=counted(arrived[~closed]),
-        arrived_closed=counted(arrived[closed]),
-        open_in=tuple(runs.layout[~closed].unique()),
-        closed_in=tuple(runs.layout[closed].unique()),
-        learned=float(runs.saved[arrived & ~closed].median()),
-        by_hand=(len(there), len(hand)),
-        better=counted(there.saved > most),
-        saved_by_hand=float(there.saved.median()),
-        lost_by_hand=(float(lost.min()), float(lost.max())),
-        saved_there=float(runs.saved[runs.layout.isin(there.index)].median()),
-        stopped=stopped,
-        stopped_early=early,
-        stopped_per_step=per_step,
-        early_per_step=early_per_step,
-        not_there={name: counted(one.ending != Ending.ARRIVED) for name, one in each.items()},
-        above={name: counted(one.saved < 0) for name, one in each.items()},
-        worse={name: counted(worsens(one)) for name, one in each.items()},
-        seconds=3600 * float(found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]),
-        hours=paper.EPISODES * paper.STEPS * paper.nmpc().plant.period / 3600,
-    )
+    riccati = found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]
+    numbers = {
+        # runs of `LEARNERS` with open gaps that solve their layout, and such with a closed gap
+        "arrived_open": counted(arrived[~closed]),
+        "arrived_closed": counted(arrived[closed]),
+        "open_in": tuple(runs.layout[~closed].unique()),  # layouts of runs with open gaps
+        "closed_in": tuple(runs.layout[closed].unique()),
+        # median reduction of the noise-free cost by runs with open gaps that solve their layout
+        "learned": float(runs.saved[arrived & ~closed].median()),
+        # layouts that theta_init with theta_c = d_o solves; of these, layouts where it costs less
+        # than any run of `LEARNERS` in the end; its median reduction there and that of the runs;
+        # the least and largest increase of the cost in the others
+        "by_hand": (len(there), len(hand)),
+        "better": counted(there.saved > most),
+        "saved_by_hand": float(there.saved.median()),
+        "saved_there": float(runs.saved[runs.layout.isin(there.index)].median()),
+        "lost_by_hand": (float(lost.min()), float(lost.max())),
+        # runs of RDES that were stopped, and how many of them within `EARLY` episodes
+        "stopped": stopped,
+        "stopped_early": early,
+        "stopped_per_step": per_step,
+        "early_per_step": early_per_step,
+        # by learner: runs that did not end at the target, that cost more than theta_init, and that
+        # cost more by more than `BETTER`
+        "not_there": {name: counted(one.ending != Ending.ARRIVED) for name, one in each.items()},
+        "above": {name: counted(one.saved < 0) for name, one in each.items()},
+        "worse": {name: counted(worsens(one)) for name, one in each.items()},
+        "seconds": 3600 * float(riccati),  # of one core, a run of ES with the compiled solver
+        "hours": paper.EPISODES * paper.STEPS * paper.nmpc().plant.period / 3600,  # of motion a run
+    }
+    return pd.Series(numbers, dtype=object)
 
 
 def _by_hand(layout: str) -> dict[str, Any]:

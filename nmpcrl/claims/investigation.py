@@ -10,6 +10,7 @@ import json
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -112,6 +113,21 @@ class Question:
     pilot: str = ""  #: the sentence of an earlier, smaller experiment
 
 
+def questions(file: str, answers: Mapping[str, Callable[[Any], Answer]]) -> tuple[Question, ...]:
+    """The questions of the TOML file beside a Python file, with the functions that answer them."""
+    texts = tomllib.loads(Path(file).with_suffix(".toml").read_text("utf-8"))
+    return tuple(
+        Question(
+            name,
+            " ".join(one["question"].split()),
+            Outcome(one["expected"]),
+            answers[name],
+            " ".join(one.get("pilot", "").split()),
+        )
+        for name, one in texts.items()
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Investigation:
     """Parts, run in order, and the questions that their rows answer."""
@@ -152,11 +168,6 @@ class Investigation:
         """The published rows; none where nothing is published."""
         known = published.about(self.name, self.where)
         return self.table() if known else pd.DataFrame(columns=NAMES)
-
-    @property
-    def registration(self) -> str:
-        """The commit that the published table is registered by; empty if it is by none."""
-        return str(published.about(self.name, self.where).get("registered", ""))
 
     def is_current(self, part: str) -> bool:
         """Whether the published rows of a part are of the present epochs."""

@@ -13,7 +13,7 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
 from nmpcrl.claims.rule import Paths, arms, drawn_anew, median
-from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_reduction
+from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_reduction, texts
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
 from nmpcrl.study.experiment import PAPER
 
@@ -80,44 +80,22 @@ def _pairs(runs: pd.DataFrame, first: str, second: str) -> tuple[pd.DataFrame, p
 
 _CLAIMS: tuple[RunClaim, ...] = (
     AtMost(
-        name="B1",
-        statement="Exact TDC is at least as good as GES.",
-        short="TDC as good\nas GES",
-        question="Does TDC end at no higher cost than GES with the same layout, decay and seed?",
-        border=f"higher by at most {SAME_COST:.0%}",
-        would_change="The step size of w, which is ours.",
+        **texts("B1"),
         threshold=SAME_COST,
         **compared(("TDC", "GES")),
     ),
     AtMost(
-        name="B2",
-        statement="The direction of a step matters: ES beats steps of its length in random"
-        " directions.",
-        question="Does ES end at a lower cost than the random walk with the same layout, decay and"
-        " seed?",
-        border=f"lower by at least {BETTER:.0%}",
-        would_change="Layouts in which theta_init can hardly be improved.",
+        **texts("B2"),
         threshold=-BETTER,
         **compared(("ES", "random")),
     ),
     AtMost(
-        name="B3",
-        statement="Only the length of its steps sets GES apart: ES with steps as long ends alike.",
-        question="Does ES with GES's step length end as GES does with the same layout, decay and"
-        " seed?",
-        border=f"apart by at most {SAME_COST:.0%}",
-        would_change="A larger beta (our assumption J): w starts near 0, and with w = 0 GES is ES.",
+        **texts("B3"),
         threshold=SAME_COST,
         **compared(("matched", "GES"), pd.Series.abs),
     ),
     AtMost(
-        name="B4",
-        statement="Q-learning with Q(s, a) is at least as good as ES.",
-        question="Does Q-learning end at no higher cost than ES with the same layout, decay and"
-        " seed?",
-        border=f"higher by at most {SAME_COST:.0%}",
-        would_change="Exploration late in training: without it, a is the input that the policy"
-        " chooses.",
+        **texts("B4"),
         threshold=SAME_COST,
         **compared(("QL", "ES")),
     ),

@@ -82,21 +82,14 @@ def _out_of_range(rows: list[dict[str, Any]], published: Published) -> list[tupl
             if abs(here / start - 1) > EXACT:
                 wrong.append((*cell, seed, "initial_cost", here, str(start)))
         for measure in MEASURES if len(group) >= FEWEST else ():
-            low, high = _widened(there[measure], SLACK * start)
-            if (~group[measure].between(low, high)).mean() > 0.5:
+            finite = there[measure][np.isfinite(there[measure])]
+            width = finite.max() - finite.min() + SLACK * start
+            failed = len(finite) < len(there)  # then no upper end; nan where each one failed
+            low, high = finite.min() - width, np.inf if failed else finite.max() + width
+            if finite.size and (~group[measure].between(low, high)).mean() > 0.5:
                 middle = float(group[measure].median())
                 wrong.append((*cell, "all", measure, middle, f"{low:.1f} to {high:.1f}"))
     return wrong
-
-
-def _widened(values: pd.Series, slack: float) -> tuple[float, float]:
-    """The range of published values; without an upper end where a published run failed."""
-    finite = values[np.isfinite(values)]
-    if finite.empty:
-        return -np.inf, np.inf
-    low, high = float(finite.min()), float(finite.max())
-    width = high - low + slack
-    return low - width, high + width if len(finite) == len(values) else np.inf
 
 
 def contradictions(found: Iterable[Verdict], known: Iterable[Verdict]) -> Pairs:
@@ -123,21 +116,6 @@ def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> Pai
 
     Both are of the same layouts and readings of the decay. Runs with other fields are skipped.
     """
-    return contradictions(*_verdicts(fresh, published))
-
-
-def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
-    """The contradictions with times taken here; none if another machine took the published ones."""
-    if published.timed.get("machine") != fingerprint():
-        return ()
-    here, there = (judge(BY_TIME, timings=one) for one in (timings, published.timings))
-    return contradictions(here, there)
-
-
-def _verdicts(
-    fresh: Mapping[Experiment, RunSummary], published: Published
-) -> tuple[tuple[Verdict, ...], tuple[Verdict, ...]]:
-    """The verdicts on runs made here, and on published runs of the same layouts and readings."""
     mine = {
         e: one
         for e, one in fresh.items()
@@ -146,10 +124,18 @@ def _verdicts(
     cells, main = {(e.layout, e.decay) for e in mine}, published.main
     there = main.where([(e.layout, e.decay) in cells for e in main.summaries])
     if not there.summaries:
-        return (), ()
+        return ()
     paths = {e: one.states for e, one in mine.items()}
     claims = BY_RUNS | WIDER_CLAIMS | OWN_CLAIMS
-    return judge(claims, table(mine), paths), judge(claims, there.runs, there.paths)
+    return contradictions(judge(claims, table(mine), paths), judge(claims, there.runs, there.paths))
+
+
+def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
+    """The contradictions with times taken here; none if another machine took the published ones."""
+    if published.timed.get("machine") != fingerprint():
+        return ()
+    here, there = (judge(BY_TIME, timings=one) for one in (timings, published.timings))
+    return contradictions(here, there)
 
 
 class Proof(NamedTuple):
@@ -206,7 +192,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Proof
             " is intended, raise the epoch of the package in nmpcrl/study/provenance.py"
         )
     for experiment, one in fresh.items():  # the next edit is compared with these
-        SUMMARIES.keep(experiment, one)
+        SUMMARIES.save(experiment, one)
     return Proof(lock.relock(), len(exact), len(drawn) - len(exact))
 
 

@@ -22,7 +22,7 @@ from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import PAPER
 
-Judged: TypeAlias = tuple[Outcome, tuple[int, int]]  # with yes and all answers
+Decision: TypeAlias = tuple[Outcome, tuple[int, int]]  # with yes and all answers
 
 WHOLE = "main table"
 PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures they read
@@ -136,7 +136,7 @@ def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(variant: str, claim: str, judged: Judged, base: Judged) -> dict[str, Any]:
+def _row(variant: str, claim: str, judged: Decision, base: Decision) -> dict[str, Any]:
     (outcome, (yes, of)), (other, (base_yes, base_of)) = judged, base
     answers = [[yes, of - yes], [base_yes, base_of - base_yes]]
     return {

@@ -141,14 +141,11 @@ def forgiving(strict: Outcome, weaker: Outcome) -> Outcome:
 def counted(answers: pd.Series, level: str = "") -> dict[str, Answers]:
     """The answers by value of a level of their index, in order of appearance, or as "all"."""
     known = answers.astype("boolean")
-    missing, yes = known.isna().to_numpy(), known.to_numpy(bool, na_value=False)
-    if level:
-        place, names = pd.factorize(answers.index.get_level_values(level))
-    else:
-        place, names = np.zeros(len(answers), int), pd.Index(["all"])
-    counts = (np.bincount(place, one, len(names)) for one in (yes, ~yes & ~missing, missing))
-    found = zip(names, *counts, strict=True)
-    return {name: Answers(*map(int, of)) for name, *of in found}
+    groups = known.groupby(level=level, sort=False) if level else (("all", known),)
+    return {
+        str(name): Answers(int(one.sum()), int((~one).sum()), int(one.isna().sum()))
+        for name, one in groups
+    }
 
 
 def settle(

@@ -8,8 +8,11 @@ A run that got stuck, hit an obstacle, failed or left the box answers like any o
 infinite where a solve failed or training was stopped.
 """
 
+import tomllib
 from collections.abc import Mapping
 from operator import attrgetter
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -41,6 +44,18 @@ BETTER = 0.01
 # A ratio of times is near what is claimed, and the claim partly reproduced, within these.
 NEAR_HALF = (0.0, 1.0)
 NEAR_SAME_TIME = (0.8, 1.25)
+
+TEXTS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
+
+
+def texts(claim: str) -> dict[str, Any]:
+    """The name and the texts of a claim, with the numbers of its border."""
+    found = {
+        name: text if name == "short" else " ".join(text.split())
+        for name, text in TEXTS[claim].items()
+    }
+    border = found.get("border", "").format_map({**globals(), "TOUCH": metrics.TOUCH})
+    return found | {"name": claim} | ({"border": border} if border else {})
 
 
 def was_stopped(runs: pd.DataFrame) -> pd.Series:

@@ -36,7 +36,6 @@ class TimeClaim(Claim):
     solver: str
     claimed: Range  # where the claim holds
     near: Range  # and where in part
-    work: str  # the reason for the ratio, in words
 
     def judge(self, observed: Observations) -> Verdict:
         """The verdict, by `decide`, with the ratio of each solver; the solver of the claim first.

@@ -47,6 +47,7 @@ def investigate(
       nmpcrl investigate worlds --part moving
       nmpcrl investigate my_study.py --publish
     """
+    from nmpcrl.study import published
     from nmpcrl.study.parameters import one_of
 
     one = _load(name)
@@ -65,7 +66,8 @@ def investigate(
                     " make them again)"
                 )
     _say(one, one.table() if judge or publish else made)
-    if judge and one.source and one.registered != one.registration:
+    registered = published.about(one.name, one.where).get("registered", "")
+    if judge and one.source and one.registered != registered:
         click.echo(f"not registered: the table is older than {name} as it is")
 
 

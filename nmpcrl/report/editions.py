@@ -15,8 +15,8 @@ from typing import Any
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.claims import evidence, robustness
 from nmpcrl.claims import published as study
+from nmpcrl.claims import robustness
 from nmpcrl.claims.finding import finding
 from nmpcrl.claims.investigation import WORDS, Answer, Investigation
 from nmpcrl.claims.own_claims import OWN_CLAIMS
@@ -254,7 +254,7 @@ def _estimate(group: str, name: str, estimate: Estimate) -> Line:
 def _finding(known: study.Published) -> list[Line]:
     """The numbers of the introduction and of Chapter 5."""
     group, one = "The finding in numbers", finding(known)
-    if one is None:
+    if one.empty:
         return []
     runs = {
         "ES and GES: runs with open gaps that solve their layout": one.arrived_open,
@@ -294,7 +294,7 @@ def _finding(known: study.Published) -> list[Line]:
         numbers |= {text: there[name] for name, text in names.items() if name in there}
     return [
         *(_count(group, name, *count) for name, count in (runs | halves).items()),
-        *(_count(group, name, *count, "layouts") for name, count in layouts.items()),
+        *(_count(group, name, yes, of, "layouts") for name, (yes, of) in layouts.items()),
         *(Line(group, name, value=float(number)) for name, number in numbers.items()),
     ]
 
@@ -312,7 +312,7 @@ MEDIANS: Mapping[str, Mapping[str, str]] = {  # numbers of verdicts, in words
 
 def _variants() -> list[Line]:
     """How many variants change a verdict of the paper's claims."""
-    every = evidence.gather("published", variants=True)
+    every = study.gather("published", variants=True)
     judged = robustness.variant_changes(every.runs, every.paths)
     changed = judged[judged.changes.astype(bool)]
     of, group = judged.variant.nunique(), "Variants"

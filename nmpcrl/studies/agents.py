@@ -19,11 +19,9 @@ import pandas as pd
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import HELD_OUT, TOLERANCE, Entry
-from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, cheaper, share
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
-from nmpcrl.studies import remedies
+from nmpcrl.claims.investigation import Answer, Investigation, Part, cheaper, questions, share
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
-from nmpcrl.studies.remedies import REMEDIES, RemedyRow
+from nmpcrl.studies.remedies import REMEDIES
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.provenance import EPOCHS
 from nmpcrl.study.refusal import Refusal
@@ -94,7 +92,6 @@ def seed_of(place: str, k: int) -> int:
 class Course:
     """The costs of an agent during training, over theta_init's cost."""
 
-    agent: str
     shares: pd.DataFrame  # a row a checkpoint; a column a layout, or in part "one" a seed
     there: pd.DataFrame  # whether the robot arrives, under every seed, as `shares`
 
@@ -150,66 +147,39 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
         there.append(pd.DataFrame([[*one] for one in run.arrived], points, units) == THERE)
     mean, every = (pd.concat(one, axis=1).T.groupby(level=0, sort=False) for one in (shares, there))
     found = (mean.mean().astype(float).T, every.all().astype(bool).T)
-    return Course(agent, *(one[[*among]] if among and len(one.T) else one for one in found))
+    return Course(*(one[[*among]] if among and len(one.T) else one for one in found))
 
 
 def _matches(one: Course, _: pd.Series) -> Answer:
     return share(one.last <= 1 + TOLERANCE, numbers=one.numbers)
 
 
-def _solves(one: Course, _: pd.Series) -> Answer:
-    return share((one.last <= 1 + TOLERANCE) & one.there.iloc[-1].astype(bool))
-
-
 def _less(one: Course, search: pd.Series) -> Answer:
     return cheaper((one.last / search.astype(float)).dropna())
 
 
-def _matches_once(one: Course, _: pd.Series) -> Answer:
-    return share(one.shares.min() <= 1 + TOLERANCE, "seeds", one.numbers)
+# answer of a course and of the costs of the search; part, and some of its layouts
+_ASKED: Mapping[str, tuple[Callable[..., Answer], str, Sequence[str]]] = {
+    "matches in 300 episodes": (_matches, "judge", ()),
+    "solves in 300 episodes": (lambda one, _: share(
+        (one.last <= 1 + TOLERANCE) & one.there.iloc[-1].astype(bool)), "judge", ()),
+    "or the best search": (_less, "judge", ()),
+    "matches in one layout": (lambda one, _: share(
+        one.shares.min() <= 1 + TOLERANCE, "seeds", one.numbers), "one", ()),
+    "or the best search in one layout": (lambda one, search: cheaper(  # each seed beside its mean
+        (one.last / search.get("A", np.nan)).dropna(), "seeds"), "one", ()),
+    "matches over the 60": (_matches, "all", [*TUNE]),
+    "matches on the 120": (_matches, "all", [*JUDGE]),
+    "or the best search on the 120": (_less, "all", [*JUDGE]),
+}  # fmt: skip
 
 
-def _less_in_one(one: Course, search: pd.Series) -> Answer:
-    """Each seed beside the mean of the search in layout A."""
-    return cheaper((one.last / search.get("A", np.nan)).dropna(), "seeds")
-
-
-# name, question, expected, answer of a course and the search's costs, part, some of its layouts
-_ASKED: Sequence[tuple[str, str, Outcome, Callable[..., Answer], str, Sequence[str]]] = (
-    ("matches in 300 episodes", "Does {} match theta_init with 300 episodes?",
-     PARTLY, _matches, "judge", ()),
-    ("solves in 300 episodes", "Does {} solve the layout with 300 episodes?",
-     NOT, _solves, "judge", ()),
-    ("or the best search", "Does {} with 300 episodes cost less than Bayes with 50?",
-     NOT, _less, "judge", ()),
-    ("matches in one layout", "Does {} match theta_init within 600 episodes in layout A?",
-     REPRODUCED, _matches_once, "one", ()),
-    ("or the best search in one layout",
-     "Does {} with 600 episodes cost less in A than Bayes with 50?", NOT, _less_in_one, "one", ()),
-    ("matches over the 60",
-     "Does one {} for all match theta_init in the layouts it was trained in?",
-     PARTLY, _matches, "all", [*TUNE]),
-    ("matches on the 120",
-     "Does one {} for all match theta_init in layouts that it has never seen?",
-     NOT, _matches, "all", [*JUDGE]),
-    ("or the best search on the 120",
-     "Does one {} for all cost less, in layouts never seen, than Bayes with 50 there?",
-     NOT, _less, "all", [*JUDGE]),
-)  # fmt: skip
-
-
-def _question(
-    agent: str, name: str, text: str, expected: Outcome, judge: Callable[..., Answer], part: str,
-    among: Sequence[str],
-) -> Question:  # fmt: skip
-    """A row of `_ASKED` for one agent."""
-
-    def answer(known: Known) -> Answer:
-        table, compared = known
-        search = searched(compared, SEARCHED[part == "one"])
-        return judge(course(table, part, agent, among), search)
-
-    return Question(f"{agent} {name}", text.format(agent), expected, answer)
+def _of_agent(
+    agent: str, judge: Callable[..., Answer], part: str, among: Sequence[str], known: Known
+) -> Answer:
+    """The answer of the course of an agent in a part, in all layouts or `among` some."""
+    table, compared = known
+    return judge(course(table, part, agent, among), searched(compared, SEARCHED[part == "one"]))
 
 
 def _one_or_other(known: Known) -> Answer:
@@ -217,35 +187,17 @@ def _one_or_other(known: Known) -> Answer:
     return cheaper((first / second).dropna())
 
 
-QUESTIONS = (
-    *(_question(agent, *one) for agent in AGENTS for one in _ASKED),
-    Question(
-        "SAC or TD3", "Does SAC cost less than TD3 with 300 episodes each?", PARTLY, _one_or_other
-    ),
-)
+QUESTIONS = questions(__file__, {
+    **{f"{agent} {name}": partial(_of_agent, agent, *of)
+       for agent in AGENTS for name, of in _ASKED.items()},
+    "SAC or TD3": _one_or_other,
+})  # fmt: skip
 
 
 def searched(compared: pd.DataFrame, part: str) -> pd.Series:
     """The cost of the best search in each layout of a part, over theta_init's cost."""
     runs = compared[(compared.part == part) & (compared.entry == SEARCH)]
     return (runs.cost / runs.initial).groupby(runs.place, sort=False).mean()
-
-
-def rows(table: pd.DataFrame, compared: pd.DataFrame) -> list[RemedyRow]:
-    """The agents' rows beside `compared`, the comparison of remedies, with 300 episodes."""
-    best = compared.groupby("place").best.first()
-    runs = table[(table.part == "judge") & table.place.isin(best.index)]
-    return remedies.rows(
-        runs.assign(
-            part="judge 300",
-            entry=runs.arm.str.split("[").str[0],
-            initial=[each[0] for each in runs.initial],
-            best=runs.place.map(best),
-            cost=[each[-1][0] for each in runs.costs],
-            arrived=[each[-1] == THERE for each in runs.arrived],
-            over=runs.episodes > PARTS["judge"].episodes,
-        )
-    )
 
 
 SAC_AND_TD3 = Investigation(

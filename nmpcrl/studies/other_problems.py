@@ -8,7 +8,7 @@ Part "spread": mpcrl's Q-learning with several solvers, then ours with the same 
 acts with what it planned before a step of theta: the order "before". `train` plans anew: "after".
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Matrix, Vector, learning
-from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, Row
+from nmpcrl.claims.investigation import Answer, Investigation, Part, Row, questions
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, td_error, train
@@ -218,32 +218,22 @@ def _alike(first: str, second: str, found: Runs) -> bool:
     return bool(abs(found.spreads[first].mean() / found.spreads[second].mean() - 1) < 0.01)
 
 
-# name, prediction, whether it comes true
-_PREDICTED: Sequence[tuple[str, str, Callable[[Runs], bool]]] = (
-    ("informed", "In at least 45 of 50 seeds QL, ES and DPG each end below the plan that begins"
-     " with the plant's A, B and mean disturbance.",
-     lambda found: _most(found.tests[["QL", "ES", "DPG"]] < found.references["informed"])),
-    ("every step", "The median of LSTD-Q at every step ends above that of QL.",
-     lambda found: found.medians["LSTD-Q, every step"] > found.medians["QL"]),
-    ("optimum", "No arm's median ends within 20 % of the best policy.",
-     lambda found: (found.medians.drop("frozen") > 1.2 * found.references["best_policy"]).all()),
-    ("alike", "The medians of QL and ES differ by less than 30 %.",
-     lambda found: abs(found.medians["QL"] / found.medians["ES"] - 1) < 0.3),
-    ("stable", "At least 48 of 50 seeds of QL, ES, TDC and DPG end with a finite cost.",
-     lambda found: np.isfinite(found.tests[["QL", "ES", "TDC", "DPG"]]).mean().min() >= 0.96),
-    ("single", "Of two tolerances of Ipopt, the median seed's J differs by more than 0.5 %, and"
-     " some seed's by more than 3 %.", _single),
-    ("mean", "The means of J over the seeds differ by less than 1 %.",
-     partial(_alike, "ipopt", "ipopt, 1e-10")),
-    ("fatrop", "With fatrop mpcrl's agent stops before its 100th step in at least 45 of 50 seeds.",
-     lambda found: _most(found.spreads["steps of fatrop"] < PEER_STEPS)),
-    ("ours", "Riccati in mpcrl's order has a mean J within 1 % of mpcrl's.",
-     partial(_alike, "before", "ipopt, 1e-10")),
-    ("chaos", "1e-10 in theta becomes more than 1e-4 within 100 steps in at least 45 of 50 seeds.",
-     lambda found: _most(found.spreads.gap.map(max) > 1e-4)),
-    ("order", "To act with the newest theta lowers J in at least 45 of 50 seeds.",
-     lambda found: _most(found.spreads.after < found.spreads.before)),
-)  # fmt: skip
+_PREDICTED: Mapping[str, Callable[[Runs], bool]] = {  # whether it comes true
+    "informed": lambda found: _most(
+        found.tests[["QL", "ES", "DPG"]] < found.references["informed"]),
+    "every step": lambda found: found.medians["LSTD-Q, every step"] > found.medians["QL"],
+    "optimum": lambda found: (
+        found.medians.drop("frozen") > 1.2 * found.references["best_policy"]).all(),
+    "alike": lambda found: abs(found.medians["QL"] / found.medians["ES"] - 1) < 0.3,
+    "stable": lambda found:
+        np.isfinite(found.tests[["QL", "ES", "TDC", "DPG"]]).mean().min() >= 0.96,
+    "single": _single,
+    "mean": partial(_alike, "ipopt", "ipopt, 1e-10"),
+    "fatrop": lambda found: _most(found.spreads["steps of fatrop"] < PEER_STEPS),
+    "ours": partial(_alike, "before", "ipopt, 1e-10"),
+    "chaos": lambda found: _most(found.spreads.gap.map(max) > 1e-4),
+    "order": lambda found: _most(found.spreads.after < found.spreads.before),
+}  # fmt: skip
 
 
 def _came_true(holds: Callable[[Runs], bool], found: Runs) -> Answer:
@@ -264,10 +254,9 @@ OTHER_PROBLEMS = Investigation(
         "spread": Part(spread, {"Q-learning": None}, PLACE, 1, SEEDS, seconds=5),
         "learners": Part(learn, ARMS, PLACE, 1, SEEDS, seconds=1),
     },
-    questions=[
-        Question(name, text, REPRODUCED, partial(_came_true, holds))
-        for name, text, holds in _PREDICTED
-    ],
+    questions=questions(
+        __file__, {name: partial(_came_true, holds) for name, holds in _PREDICTED.items()}
+    ),
     seed=lambda _, k: k,
     evidence=runs,
     digits=7,

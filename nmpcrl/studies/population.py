@@ -9,7 +9,7 @@ decay; it holds there if more than `MAJORITY` of them are yes. Shares of layouts
 `rule.read`. A layout answers by the runs that are known.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, astuple, dataclass, replace
 from functools import cache, cached_property, partial
 from typing import Any
@@ -32,6 +32,7 @@ from nmpcrl.claims.investigation import (
     Row,
     above,
     counted,
+    questions,
     share,
 )
 from nmpcrl.claims.own_claims import OWN_CLAIMS
@@ -41,7 +42,7 @@ from nmpcrl.claims.rule import MAJORITY, Observations, Paths, forgiving, read
 from nmpcrl.claims.thresholds import was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.studies import difficulty
-from nmpcrl.studies.predictors import predictor_scores
+from nmpcrl.studies.difficulty import predictor_scores
 from nmpcrl.study import paper, published
 from nmpcrl.study.design import MAIN_TABLE, sweep
 from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS, TUNE, name_of
@@ -382,48 +383,18 @@ def cliff(raised: pd.Series) -> Answer:
     return share(raised >= CLIFF_COST, numbers={"most": float(raised.max())})
 
 
-QUESTIONS: Sequence[Question] = (
-    Question("closing gaps",
-             "Does ES fail where the gap closes by then, and succeed where it does not?",
-             PARTLY, lambda drawn: closing_gaps(drawn.layouts, succeeds(drawn.main)),
-             "ES fails exactly where the first gap of the first trajectory closes at theta_c below"
-             f" {CLOSES_BEFORE}."),
-    Question("predictors",
-             "Does the closing of the first gap tell better than each rival where ES succeeds?",
-             PARTLY, predictors),
-    Question("horizon",
-             "Does ES still fail with N = 20 and N = 40 where it fails with N = 10?",
-             REPRODUCED, lambda drawn: horizon(drawn.runs),
-             "The horizon was not too short."),
-    Question("gaps and horizon",
-             "With theta_c raised and nothing learned, does the robot stop arriving at the same"
-             " theta_c for N = 10, 20 and 40?",
-             REPRODUCED, lambda drawn: gaps_and_horizon(drawn.stops),
-             "A gap closes at the same theta_c whatever the horizon."),
-    Question("trap",
-             "Is that so where ES ends without having arrived?",
-             REPRODUCED, lambda drawn: caught(drawn.main, f"moved < {STANDING} and worth < 1"),
-             "The robot stands, and the plan's value is below l / (1 - gamma): so delta > 0 and"
-             " theta_c grows."),
-    Question("accurate and worse",
-             "Does |delta| fall while the noise-free cost rises?",
-             REPRODUCED, lambda drawn: caught(
-                 drawn.main, "delta_last < delta_first and final_cost > initial_cost"
-             ),
-             "In the trap the value gets more accurate while the policy gets worse."),
-    Question("cliff",
-             f"Does theta_c raised by {CLIFF_RAISED:.0%} cost at least {CLIFF_COST:.0%}?",
-             PARTLY, lambda drawn: cliff(raised()),
-             "Beside the best theta, 1 to 2 % more theta_c costs 50 to 140 %."),
-    Question("early overshoot",
-             "Is that so of RDES in the reading per episode with ES's alpha, and of no other?",
-             REPRODUCED, lambda drawn: early_overshoot(drawn.main),
-             "RDES overshoots early: most of its runs that are stopped have alpha ||phi||^2 > 2,"
-             f" and most are dead by episode {DEAD_BY}."),
-    Question("whole picture",
-             "Is there a layout, reading and step size in which C1, C2, C5 and C9 hold together?",
-             NOT, lambda drawn: whole_picture(drawn.tried)),
-)  # fmt: skip
+QUESTIONS = questions(__file__, {
+    "closing gaps": lambda drawn: closing_gaps(drawn.layouts, succeeds(drawn.main)),
+    "predictors": predictors,
+    "horizon": lambda drawn: horizon(drawn.runs),
+    "gaps and horizon": lambda drawn: gaps_and_horizon(drawn.stops),
+    "trap": lambda drawn: caught(drawn.main, f"moved < {STANDING} and worth < 1"),
+    "accurate and worse": lambda drawn: caught(
+        drawn.main, "delta_last < delta_first and final_cost > initial_cost"),
+    "cliff": lambda drawn: cliff(raised()),
+    "early overshoot": lambda drawn: early_overshoot(drawn.main),
+    "whole picture": lambda drawn: whole_picture(drawn.tried),
+})  # fmt: skip
 
 POPULATION = Investigation(
     name="population",

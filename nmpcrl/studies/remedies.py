@@ -32,14 +32,14 @@ from nmpcrl.claims.investigation import (
     Condition,
     Investigation,
     Part,
-    Question,
     Row,
     above,
     counted,
+    questions,
     share,
 )
 from nmpcrl.claims.rule import MAJORITY
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.verdict import PARTLY, UNDECIDABLE
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.refusal import Refusal
 
@@ -342,43 +342,19 @@ def _difference(first: str, second: str, table: pd.DataFrame) -> Answer:
     )
 
 
-_SEARCH_BEFORE = (
-    "CMA-ES with 300 rollouts has 0.98, 1.0, 0.99, 0.99, 0.71 and 0.38 of the possible gain in"
-)
-QUESTIONS = (
-    Question("search and learning",
-             "Has CMA-ES more of the possible gain than ES with 300 episodes each?",
-             REPRODUCED, _search_and_learning,
-             f"{_SEARCH_BEFORE} A to F, where ES has 0.53, 0.47, 0.72 and 0.45 and fails."),
-    Question("search nears the best",
-             "Has CMA-ES at least 0.9 of the possible gain with 300 rollouts?",
-             PARTLY, lambda table: share(shares(_runs(table, "judge 300", "CMA-ES")) >= NEARLY),
-             f"{_SEARCH_BEFORE} A to F."),
-    *(
-        Question(f"undone steps on the {what} gain", f"Does {entry} gain?", REPRODUCED,
-                 partial(_gains, entry), "Gauss-Newton with undo gained in 18 of 18.")
-        for what, entry in (("loop's cost", "undone-GN-J"), ("TD error", "undone-LSTD-Q"))
-    ),
-    Question("one number by hand",
-             "Does the grid over theta_c cost less than GES with 300 episodes?",
-             REPRODUCED, _by_hand,
-             "theta_c by hand does better than GES wherever the robot still arrives."),
-    Question("faster auxiliary weights",
-             "Has GES with beta = 3 alpha and a normalised step more of the gain than GES?",
-             PARTLY, partial(_difference, "GES-3", "GES")),
-    Question("guard",
-             "Does RDES with the guard solve the layout where RDES with that step size does not?",
-             REPRODUCED, _guard, "The guard stops the overshoot."),
-    Question("lengths or directions",
-             "Has RDES with the guard more of the gain than its lengths in ES's direction?",
-             NOT, partial(_difference, "guarded-RDES", "control-RDES")),
-    Question("averaging",
-             "Has the averaged theta of ES more of the gain than its last theta?",
-             NOT, partial(_difference, "averaged-ES", "ES")),
-    Question("undo",
-             "Has ES with undo more of the gain than ES with as much interaction?",
-             PARTLY, partial(_difference, "undone-ES", "ES")),
-)  # fmt: skip
+QUESTIONS = questions(__file__, {
+    "search and learning": _search_and_learning,
+    "search nears the best":
+        lambda table: share(shares(_runs(table, "judge 300", "CMA-ES")) >= NEARLY),
+    "undone steps on the loop's cost gain": partial(_gains, "undone-GN-J"),
+    "undone steps on the TD error gain": partial(_gains, "undone-LSTD-Q"),
+    "one number by hand": _by_hand,
+    "faster auxiliary weights": partial(_difference, "GES-3", "GES"),
+    "guard": _guard,
+    "lengths or directions": partial(_difference, "guarded-RDES", "control-RDES"),
+    "averaging": partial(_difference, "averaged-ES", "ES"),
+    "undo": partial(_difference, "undone-ES", "ES"),
+})  # fmt: skip
 
 REMEDIES = Investigation(
     name="remedies",

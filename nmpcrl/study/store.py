@@ -98,7 +98,7 @@ class Store(Generic[Value]):
                 value = self.read(named, report=True)
                 if value is None:
                     value = self.make(named, **options)
-                    self.keep(named, value)
+                    self.save(named, value)
         return value
 
     def fetch_all(
@@ -132,7 +132,7 @@ class Store(Generic[Value]):
             ready = partial(self._reserve, found, locks)
             try:
                 for named, value in parallel(self.make, missing, workers, label, executor, ready):
-                    self.keep(named, value)
+                    self.save(named, value)
                     found[named] = value
                     locks.pop(named).release()
             except Failed as error:
@@ -150,7 +150,7 @@ class Store(Generic[Value]):
             say(str(failed))
         return Runs({one: found[one] for one in wanted if one in found})
 
-    def keep(self, named: Named, value: Any) -> None:
+    def save(self, named: Named, value: Any) -> None:
         """Store a value, unless another solver than the experiment's made it.
 
         StoreError: a worker with other code made it, or the file cannot be written.

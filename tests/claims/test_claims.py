@@ -19,7 +19,6 @@ from nmpcrl.analysis.summary import summarise
 from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims import own_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measurement, audit, measured
-from nmpcrl.claims.by_runs import halves
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Observations, judge
 from nmpcrl.claims.timing import WAITED, decide
@@ -263,8 +262,8 @@ def test_only_pairs_that_differ_tell_the_learners_apart(pairs, counts, as_claime
     cells = [("A", decay, seed) for decay in ("step", "episode") for seed in range(len(pairs))]
     index = pd.MultiIndex.from_tuples(cells, names=["layout", "decay", "seed"])
     values = pd.DataFrame(pairs * 2, index, columns=["DES", "RDES"])
-    found = halves(("DES", "RDES"), values, {"diverged": 1.5, "lost": np.finfo(float).max})
-    ways = [*product(("diverged", "lost"), ("step", "episode"))]
+    found = [*BY_RUNS["C1"].split(values)]
+    ways = [*product(("diverged", "had to be stopped"), ("step", "episode"))]
     assert [(one.wrong, one.decay) for one in found] == ways
     for one in found[:2]:
         assert (one.counts, one.pairs) == (counts, len(values.dropna()) / 2)

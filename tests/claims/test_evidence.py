@@ -5,8 +5,8 @@ import pytest
 
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.claims import evidence, publish, published
-from nmpcrl.claims.evidence import gather, needed
+from nmpcrl.claims import publish, published
+from nmpcrl.claims.published import gather, needed
 from nmpcrl.study.design import main_table
 from nmpcrl.study.experiment import frozen_arm
 
@@ -49,7 +49,7 @@ def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_ar
         np.testing.assert_allclose(mine.episodes["cost"], summary.episodes["cost"], rtol=1e-6)
         np.testing.assert_allclose(mine.states, summary.states, atol=1e-5)
     assert not any(len(summary.actions) for summary in found.summaries.values())
-    for experiment, one in evidence.with_inputs(found).summaries.items():
+    for experiment, one in published.with_inputs(found).summaries.items():
         np.testing.assert_allclose(one.actions, known[experiment].actions, atol=1e-6)
 
 

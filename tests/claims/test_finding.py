@@ -5,13 +5,13 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import published
-from nmpcrl.claims.finding import Finding, finding
+from nmpcrl.claims.finding import finding
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import layouts, paper
 
 
 @pytest.fixture(scope="module")
-def found() -> Finding:
+def found() -> pd.Series:
     return finding(published.load())
 
 
@@ -71,4 +71,4 @@ def test_rdes_is_counted_in_each_reading_of_the_decay(found, decay, stopped, ear
 
 
 def test_without_published_runs_there_is_no_finding():
-    assert finding(published.Published()) is None
+    assert finding(published.Published()).empty

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from nmpcrl.claims.investigation import of_file
+from nmpcrl.study import published
 from nmpcrl.study.refusal import Refusal
 
 PAGE = Path(__file__).parents[2] / "book" / "09_your_own.ipynb"
@@ -57,7 +58,8 @@ def test_a_committed_file_is_registered_by_its_commit(own, command):
     git("commit", "-qm", "Ask")
     assert of_file(own).registered == git("rev-parse", "HEAD")
     said = command("investigate", str(own), "--publish", "--workers", "1").stdout
-    assert of_file(own).registration == git("rev-parse", "HEAD")
+    commit = published.about(of_file(own).name, own.parent / "published")["registered"]
+    assert commit == git("rev-parse", "HEAD")
     assert "not registered" not in said + command("investigate", str(own), "--judge").stdout
     own.write_text(own.read_text() + "\n# changed\n")
     assert of_file(own).registered == ""

@@ -22,7 +22,6 @@ from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import (
-    evidence,
     finding,
     own_claims,
     paper_claims,
@@ -37,13 +36,13 @@ from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import drawn as drawn_report
 from nmpcrl.report import worlds as world_report
 from nmpcrl.studies import agents, interventions, other_problems, population, remedies, worlds
-from nmpcrl.studies.predictors import predictor_scores
+from nmpcrl.studies.difficulty import predictor_scores
 from nmpcrl.study import design, paper, provenance
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
 
 FOLDER = Path(__file__).parent
-ROLLOUT = 6  # digits of a rollout's cost, which are the same on all machines
+ROLLOUT = 6  # digits of a cost of a rollout, or of an optimum, that are the same on all machines
 RAISED = 4  # digits of a difference of two such costs
 
 
@@ -72,7 +71,7 @@ trained = cache(lambda: agents.SAC_AND_TD3.table())
 changing = cache(lambda: worlds.WORLDS.table())
 again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
-every = cache(lambda: evidence.gather("published", variants=True))
+every = cache(lambda: published.gather("published", variants=True))
 six_paths = cache(lambda: every().paths)
 raised = cache(population.raised)
 
@@ -207,7 +206,9 @@ def named(question: str, answer: Any) -> Any:
 def predictors() -> Any:
     parts, layouts = drawn().runs.groupby("part"), drawn().layouts
     tuned, judged = population.succeeds(parts.get_group("tune")), population.succeeds(drawn().main)
-    return predictor_scores(layouts, tuned, judged)
+    found = predictor_scores(layouts, tuned, judged)
+    fitted = ("slope", "brier")  # of which BFGS finds no more digits
+    return found.assign(**{name: [plain(one, ROLLOUT) for one in found[name]] for name in fitted})
 
 
 def successes() -> Any:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nmpcrl.studies.predictors import auc, brier, predicted
+from nmpcrl.studies.difficulty import auc, brier, predicted
 
 
 @given(st.lists(st.tuples(st.integers(0, 4), st.booleans()), min_size=2, max_size=20))

@@ -14,7 +14,6 @@ from nmpcrl.studies import (
     difficulty,
     interventions,
     population,
-    predictors,
     remedies,
     worlds,
 )
@@ -30,7 +29,7 @@ REGISTERED = [  # today's modules; commit, module and name of questions; their p
      ("all",)),
     (*WORLDS, "cff09a0", "world_questions", "WORLD_QUESTIONS", ("all",)),
     (*WORLDS, "ff05118", "terminal_questions", "TERMINAL_QUESTIONS", ("terminal",)),
-    ((population, difficulty, predictors), DRAWN, "46c248b", "population_questions", "QUESTIONS",
+    ((population, difficulty), DRAWN, "46c248b", "population_questions", "QUESTIONS",
      tuple(population.PARTS)),
 ]  # fmt: skip
 each = pytest.mark.parametrize(NAMES, REGISTERED)

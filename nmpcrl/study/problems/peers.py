@@ -1,4 +1,4 @@
-"""`gros_zanon` and `lqr` in csnlp and mpcrl (F. Airaldi), which share no code with this package.
+"""`gros_zanon` in csnlp and mpcrl (F. Airaldi), which share no code with this package.
 
 Plan, plant and agent of `gros_zanon` are those of mpcrl's example of Q-learning: a step of Newton
 for each transition, with the outer product of Q's gradient for a Hessian, and no exploration.
@@ -22,7 +22,6 @@ from nmpcrl.control import Nmpc, Problem
 from nmpcrl.learning.environment import StepFunction
 from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.study.problems import gros_zanon as gz
-from nmpcrl.study.problems import lqr
 
 RATE = 0.05  # of mpcrl's example
 IPOPT = {"print_level": 0, "sb": "yes", "max_iter": 500}
@@ -53,7 +52,7 @@ def run(solver: str, seed: int, steps: int) -> Run:
 
     with silent(), suppress(MpcSolverError):
         there = world(gz.problem(), plant, gz.START, steps)
-        agent(gros_zanon_plan(solver)).train(there, episodes=1, seed=seed)
+        agent(gros_zanon_plan(solver), gz.problem()).train(there, episodes=1, seed=seed)
     return Run(np.array(costs), np.array(disturbances))
 
 
@@ -63,21 +62,15 @@ def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> A
     return TransformReward(env, lambda reward: -float(reward))
 
 
-def agent(
-    controller: Mpc, problem: Problem | None = None, optimiser: Any = None
-) -> LstdQLearningAgent:
-    """Q-learning after each transition, of a plan in csnlp; `problem` has its theta and gamma.
-
-    By default they are those of `gros_zanon`, and the optimiser of mpcrl is a step of Newton.
-    """
-    problem = problem or gz.problem()
+def agent(controller: Mpc, problem: Problem) -> LstdQLearningAgent:
+    """Q-learning after each transition, of a plan in csnlp; `problem` has its theta and gamma."""
     learnable = [LearnableParameter(name, one.shape, one) for name, one in starts(problem).items()]
     return LstdQLearningAgent(
         mpc=controller,
         learnable_parameters=LearnableParametersDict(learnable),
         discount_factor=problem.gamma,
         update_strategy=1,
-        optimizer=optimiser or NewtonMethod(RATE),
+        optimizer=NewtonMethod(RATE),
         hessian_type="approx",
         remove_bounds_on_initial_action=True,
     )
@@ -90,7 +83,7 @@ def starts(problem: Problem) -> dict[str, Any]:
 
 def gros_zanon_plan(solver: str) -> Mpc:
     """The plan of `gros_zanon` by multiple shooting, with one of `SOLVERS`."""
-    plan, th = _begin(gz.problem())
+    plan, th = begin(gz.problem())
     x, _ = plan.state("x", 2, bound_initial=False)
     u, _ = plan.action("u", 1, lb=-1, ub=1)
     slack, _, _ = plan.variable("s", (2, gz.HORIZON), lb=0)
@@ -102,23 +95,10 @@ def gros_zanon_plan(solver: str) -> Mpc:
         z, v, s = x[:, i], u[:, i], slack[:, i]
         stage = 0.5 * (z.T @ z + 0.5 * v**2 + gz.PENALTY * (s[0] + s[1]))
         objective += gz.GAMMA**i * stage + th["f"][:2].T @ z + th["f"][2] * v
-    return _end(plan, objective, solver)
+    return end(plan, objective, solver)
 
 
-def lqr_plan(solver: str) -> Mpc:
-    """The plan of `lqr` by multiple shooting, with one of `SOLVERS`."""
-    plan, th = _begin(lqr.problem())
-    x, _ = plan.state("x", 2, bound_initial=False)
-    u, _ = plan.action("u", 1)
-    plan.set_affine_dynamics(th["A"], th["B"])
-    objective = th["V0"] + gz.GAMMA**gz.HORIZON * (x[:, -1].T @ th["P"] @ x[:, -1])
-    for i in range(gz.HORIZON):
-        stage = x[:, i].T @ th["Q"] @ x[:, i] + u[:, i].T @ th["R"] @ u[:, i]
-        objective += gz.GAMMA**i * stage
-    return _end(plan, objective, solver)
-
-
-def _begin(problem: Problem) -> tuple[Mpc, dict[str, Any]]:
+def begin(problem: Problem) -> tuple[Mpc, dict[str, Any]]:
     """An empty plan, and theta as its parameters by name."""
     plan = Mpc(Nlp("SX"), problem.horizon)
     return plan, {
@@ -127,7 +107,7 @@ def _begin(problem: Problem) -> tuple[Mpc, dict[str, Any]]:
     }
 
 
-def _end(plan: Mpc, objective: Any, solver: str) -> Mpc:
+def end(plan: Mpc, objective: Any, solver: str) -> Mpc:
     """The plan with its objective and its solver."""
     plan.minimize(objective)
     common = {"expand": True, "print_time": False, "bound_consistency": True, "calc_lam_p": False}

@@ -28,7 +28,7 @@ def strict(solution: Solution) -> bool:
 @pytest.fixture(scope="module")
 def agent():
     with peers.silent():
-        return peers.agent(peers.gros_zanon_plan("ipopt, exact"))
+        return peers.agent(peers.gros_zanon_plan("ipopt, exact"), PROBLEM)
 
 
 @pytest.mark.slow

@@ -58,7 +58,16 @@ def test_the_worth_of_a_gain_is_what_it_costs():
 
 @pytest.fixture
 def agent():
-    return peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem())
+    """mpcrl's agent with a plan of `lqr` by multiple shooting in csnlp."""
+    plan, th = peers.begin(lqr.problem())
+    x, _ = plan.state("x", 2, bound_initial=False)
+    u, _ = plan.action("u", 1)
+    plan.set_affine_dynamics(th["A"], th["B"])
+    objective = th["V0"] + gz.GAMMA**gz.HORIZON * (x[:, -1].T @ th["P"] @ x[:, -1])
+    for i in range(gz.HORIZON):
+        stage = x[:, i].T @ th["Q"] @ x[:, i] + u[:, i].T @ th["R"] @ u[:, i]
+        objective += gz.GAMMA**i * stage
+    return peers.agent(peers.end(plan, objective, "ipopt, 1e-10"), lqr.problem())
 
 
 def test_value_and_action_are_csnlps(nmpc, agent):
