@@ -73,8 +73,10 @@ def failure_modes(
     `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
     well). `runs` is the `rows.table` of the summaries; `every` includes the `frozen_arm` of each.
     """
+    signs = was_stopped(runs), divergence(runs).fillna(False), worsens(runs)
+    failures = np.select([one.to_numpy(bool) for one in signs], [*Failure], "").tolist()
     rows = []
-    for (e, run), wrong in zip(summaries.items(), went_wrong(runs), strict=True):
+    for (e, run), wrong in zip(summaries.items(), failures, strict=True):
         if e.learner == "frozen":
             rows.append(("", "", "", pd.NA))
             continue
@@ -82,13 +84,6 @@ def failure_modes(
         began = rise(run).start if wrong else pd.NA
         rows.append((ending(run.states, e.task), wrong, found, began))
     return pd.DataFrame(rows, columns=FAILURE_MODE)
-
-
-def went_wrong(runs: pd.DataFrame) -> list[str]:
-    """Where each run went wrong: a `Failure`, or ""."""
-    signs = was_stopped(runs), divergence(runs).fillna(False), worsens(runs)
-    found: list[str] = np.select([one.to_numpy(bool) for one in signs], [*Failure], "").tolist()
-    return found
 
 
 def rise(run: RunSummary) -> slice:

@@ -273,25 +273,21 @@ class Investigation:
 
         Rows of earlier epochs are replaced part by part, once every arm of the part is complete.
         """
-        there, made, new = self._published(), self.made(), dict[Any, pd.DataFrame]()
-        older = {part for part in there.part.unique() if not self.is_current(part)}
-        for (part, arm), rows in made.groupby(["part", "arm"], sort=False) if len(made) else ():
-            by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
-            if not {*order} <= {*by.index}:
-                continue
-            block = by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
-            old = there[(there.part == part) & (there.arm == arm)].reset_index(drop=True)
-            same = [name for name in old if name != "seconds"]
-            if old.empty or part in older:
-                new[part, arm] = block
-            elif not old[same].equals(block[same]):
-                raise Unpublishable(f"{arm} of the part {part!r} is published with other numbers")
-        replaced = {
-            part
-            for part in older & {part for part, _ in new}
-            if {*self.parts[part].settings(self.known())} <= {arm for at, arm in new if at == part}
-        }
-        blocks = [block for (part, _), block in new.items() if part not in older - replaced]
+        there, made = self._published(), self.made()
+        blocks, replaced = list[pd.DataFrame](), set[str]()
+        for part, rows in made.groupby("part", sort=False) if len(made) else ():
+            old, arms = there[there.part == part], self._complete(str(part), rows)
+            if len(old) and not self.is_current(str(part)):
+                if not {*self.parts[str(part)].settings(self.known())} <= {*arms}:
+                    continue
+                replaced.add(str(part))
+            else:
+                same = [name for name in old if name != "seconds"]
+                for arm in {*arms} & {*old.arm}:
+                    known = old[old.arm == arm][same].reset_index(drop=True)
+                    if not known.equals(arms.pop(arm)[same]):
+                        raise Unpublishable(f"{arm} of {part!r} is published with other numbers")
+            blocks += arms.values()
         if not blocks:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
         added, kept = pd.concat(blocks), self._with_lists(there)[~there.part.isin(replaced)]
@@ -312,6 +308,16 @@ class Investigation:
             ),
             where=self.where,
         )
+
+    def _complete(self, part: str, rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+        """The complete arms of a part as they are published."""
+        found = {}
+        for arm, each in rows.groupby("arm", sort=False):
+            by, order = each.set_index(["place", "k"], drop=False), self.parts[part].order(str(arm))
+            if {*order} <= {*by.index}:
+                block = by.loc[order].reset_index(drop=True)
+                found[str(arm)] = block.map(partial(rounded, digits=self.digits))
+        return found
 
     def _with_lists(self, table: pd.DataFrame) -> pd.DataFrame:
         """The published rows with the columns of lists that are published apart."""

@@ -201,12 +201,18 @@ def _load(place: Path) -> Published:
         for i, (e, one) in enumerate(rows.items())
     }
     ratios = [*cost_ratios(rows).values()]
+    searches = {
+        Search(one.layout, one.seed, one.budget): SearchResult(
+            tuple(one.theta), one.made, tuple(one.rollouts), tuple(one.best)
+        )
+        for one in _table(SEARCHES, place).itertuples()
+    }
     return Published(
         Runs(outlines),
         runs.reindex(columns=COLUMNS).assign(source="published", cost_ratio=ratios),
         _table(TIMINGS, place),
         store.about(RUNS, place),
-        dict(map(_search, _table(SEARCHES, place).itertuples())),
+        searches,
         store.about(TIMINGS, place).get("batches", [{}])[-1],
     )
 
@@ -214,11 +220,6 @@ def _load(place: Path) -> Published:
 def _table(name: str, place: Path) -> pd.DataFrame:
     """A published table; empty if none is published."""
     return store.read(name, place) if store.about(name, place) else pd.DataFrame()
-
-
-def _search(row: Any) -> tuple[Search, SearchResult]:
-    found = SearchResult(tuple(row.theta), row.made, tuple(row.rollouts), tuple(row.best))
-    return Search(row.layout, row.seed, row.budget), found
 
 
 def _outline(e: Experiment, row: Mapping[str, Any], curves: Mapping[str, Column]) -> RunSummary:

@@ -203,8 +203,8 @@ def back(series: list[float], change: int) -> float:
 
 
 def _back_soon(table: pd.DataFrame) -> Answer:
-    runs = table[(table.part == "once") & (table.arm == "ES told plain")]
-    found = [back(run.series, changes("once", run.place)[0]) for run in runs.itertuples()]
+    rows = table[(table.part == "once") & (table.arm == "ES told plain")]
+    found = [back(row.series, changes("once", row.place)[0]) for row in rows.itertuples()]
     until = pd.Series(found, dtype=float)
     return share(until <= SOON, "sequences", {"median episodes": float(until.median())})
 
@@ -268,11 +268,6 @@ def _still_fails(kind: str, table: pd.DataFrame) -> Answer:
     return share(~solved[kind][~solved[TERMINALS[0]]])
 
 
-def _richer(table: pd.DataFrame) -> Answer:
-    costs = means(table, "terminal")
-    return cheaper((costs["learned"] / costs[TERMINALS[0]]).dropna())
-
-
 QUESTIONS = questions(__file__, {
     "a velocity is enough": partial(_view, "extrapolated", lambda ratio: ratio <= 1 + CLEARLY),
     "a frozen view costs more": partial(_view, "frozen", lambda ratio: ratio >= 1 + CLEARLY),
@@ -307,7 +302,8 @@ QUESTIONS = questions(__file__, {
     "carried over": _carries,
     "full terminal cost": partial(_still_fails, "full"),
     "learned terminal cost": partial(_still_fails, "learned"),
-    "a richer terminal cost pays": _richer,
+    "a richer terminal cost pays": lambda table: cheaper(
+        (means(table, "terminal")["learned"] / means(table, "terminal")[TERMINALS[0]]).dropna()),
 })  # fmt: skip
 
 WORLDS = Investigation(

@@ -12,7 +12,6 @@ that a seeded sampler drew and `screen` accepted, so that no layout was selected
 test draws them again.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -50,7 +49,10 @@ class Screening:
 def screen(centres: Centres) -> Screening:
     """Apply the criteria to a layout; nothing is trained for it."""
     task = paper.task(centres)
-    blocked = _nearest(task.start[:2], task.target[:2], centres) < _keep_out(task, 0)
+    along, away = (task.target - task.start)[:2], np.asarray(centres) - task.start[:2]
+    share = np.clip(away @ along / (along @ along), 0, 1)  # of the line, to each centre's foot
+    nearest = np.linalg.norm(away - share[:, None] * along, axis=1).min()
+    blocked = bool(nearest < _keep_out(task, 0))
     clear = task.collision_penalty(task.start) == 0 == task.collision_penalty(task.target)
     if not (blocked and clear):
         return Screening(blocked, clear, arrives=False, closing=False)
@@ -87,14 +89,6 @@ def gaps(task: Task, path: Matrix, theta_c: float) -> dict[tuple[int, int], floa
 def _keep_out(task: Task, theta_c: float) -> float:
     """Distance [m] from an obstacle's centre at which Xi + theta_c = 0."""
     return float(task.discs[2].max() / 2 * np.sqrt(1 + theta_c))
-
-
-def _nearest(start: Vector, end: Vector, points: Sequence[Sequence[float]]) -> float:
-    """The least distance of points, shape (k, 2), from the segment between two points."""
-    along = end - start
-    away = np.asarray(points) - start
-    share = np.clip(away @ along / (along @ along), 0, 1)
-    return float(np.linalg.norm(away - share[:, None] * along, axis=1).min())
 
 
 def _crosses(path: Matrix, one: Vector, other: Vector) -> bool:
