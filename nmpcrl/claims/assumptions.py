@@ -11,6 +11,7 @@ import numpy as np
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.claims.rule import Claim, Observations
+from nmpcrl.claims.thresholds import TEXTS
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE, Assumption, Verdict
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Records
@@ -49,32 +50,20 @@ def measured(experiment: Experiment, records: Records, curvature: Curvature) -> 
 
 
 def audit(experiment: Experiment, found: Measurement) -> tuple[Assumption, ...]:
-    """The assumptions of `THEOREMS`, beside one run of GES."""
+    """The assumptions of `THEOREMS`, in `claims.toml`, beside one run of GES."""
     a, b = experiment.alpha, experiment.beta
-    rows = (
-        ("the value is linear in theta",
-         "it is the value of an optimal control problem, which is not",
-         False, (LINEAR,)),
-        ("the value is three times differentiable in theta",
-         f"it has a kink wherever an active set changes; {found.kinks:.1%} of the steps of a run"
-         " of GES start exactly on one",
-         found.kinks == 0, (SMOOTH,)),
-        ("a finite MDP", "states and actions are continuous", False, THEOREMS),
-        ("transitions drawn independently from one distribution",
-         "one trajectory of a policy that changes; consecutive TD errors have a correlation of"
-         f" {found.memory:.2f}",
-         False, (SMOOTH,)),
-        ("the policy that acts stays the same", "it is that of theta, and moves with it",
-         False, THEOREMS),
-        ("step sizes that decay, their squares summable",
-         f"constant, alpha = {a:g} and beta = {b:g}",
-         False, THEOREMS),
-        ("w moves faster than theta, alpha / beta to 0", f"alpha / beta = {a / b:g}",
-         a < b, THEOREMS),
-        ("theta is projected onto a compact set", "there is no projection", False, (SMOOTH,)),
-        ("the update follows the gradient of the MSPBE, curvature included",
-         "the paper's (16) drops the curvature term, whose size beside the printed direction is"
-         f" {found.dropped:.1e} in the median; a value that is linear has none",
-         found.dropped == 0, (SMOOTH,)),
-    )  # fmt: skip
-    return tuple(Assumption(*row) for row in rows)
+    met = {
+        "no kinks": found.kinks == 0,
+        "w is faster": a < b,
+        "nothing is dropped": found.dropped == 0,
+    }
+    numbers = {**vars(found), "alpha": a, "beta": b, "ratio": a / b}
+    return tuple(
+        Assumption(
+            one["theorem"],
+            " ".join(one["here"].split()).format(**numbers),
+            met.get(one.get("holds_if"), False),
+            tuple(one["by"]),
+        )
+        for one in TEXTS["assumptions"]
+    )
