@@ -283,10 +283,12 @@ class Investigation:
                 replaced.add(str(part))
             else:
                 same = [name for name in old if name != "seconds"]
-                for arm in {*arms} & {*old.arm}:
+                for arm in filter(arms.__contains__, old.arm.unique()):
                     known = old[old.arm == arm][same].reset_index(drop=True)
                     if not known.equals(arms.pop(arm)[same]):
-                        raise Unpublishable(f"{arm} of {part!r} is published with other numbers")
+                        raise Unpublishable(
+                            f"{arm} of the part {part!r} is published with other numbers"
+                        )
             blocks += arms.values()
         if not blocks:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
