@@ -459,9 +459,6 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
             name: one.outcome
             for name, one in agents.SAC_AND_TD3.judge((trained(), suite()[:0])).items()
         },
-        "rows of the suite": lambda: {
-            one.entry: by_field(one) for one in agents.rows(trained(), suite())
-        },
         "costs of the best search": lambda: {
             part: agents.searched(suite(), part) for part in agents.SEARCHED
         },
