@@ -152,7 +152,7 @@ def controls(found: Evidence, layout: str) -> Drawn:
     """Fig. 3 of the paper, over seeds: the inputs under the learned policies, without noise.
 
     Args:
-        found: runs whose inputs are known, as by `evidence.with_inputs`.
+        found: runs whose inputs are known, as by `published.with_inputs`.
         layout: of the obstacles.
     """
     drawn = _finished(part(found, SHOWN, layout))
