@@ -92,7 +92,7 @@ class Answer:
     outcome: Outcome
     counts: Mapping[str, tuple[int, int]] = field(default_factory=dict)  #: yes, asked; by unit
     numbers: Mapping[str, float] = field(default_factory=dict)
-    beside: Mapping[str, tuple[int, int]] = field(default_factory=dict)  #: decide nothing
+    beside: Mapping[str, tuple[int, int]] = field(default_factory=dict)  #: further counts
     said: str = ""  #: the outcome in words, where `WORDS` would mislead
     question: str = ""  #: its name
 

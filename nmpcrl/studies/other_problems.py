@@ -6,6 +6,7 @@ mpcrl's example. Part "references": costs of a step that the learners are compar
 
 Part "spread": mpcrl's Q-learning with several solvers, then ours with the same disturbances. mpcrl
 acts with what it planned before a step of theta: the order "before". `train` plans anew: "after".
+`other_problems.toml` has the predictions.
 """
 
 from collections.abc import Callable, Mapping

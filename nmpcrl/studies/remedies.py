@@ -1,7 +1,8 @@
 """21 learners, remedies and searches at equal interaction: what to try where learning fails.
 
-Settings, parts, questions and the rule of the advice were committed before any entry was tuned or
-judged; the file of that commit says what each question measures, and which pilots were known.
+Settings, parts, the rule of the advice and questions, in `remedies.toml`, were committed before any
+entry was tuned or judged; the file of that commit says what each question measures, and which
+pilots were known.
 
 An entry begins from theta_init with 50 or 300 episodes a layout and seed. An entry with settings
 tries four of them in the layouts of `tune`, the default first; the one with the greatest gain is

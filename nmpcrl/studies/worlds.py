@@ -1,7 +1,7 @@
 """Obstacles that move, a wrong model, layouts that change, richer terminal costs: 28 questions.
 
-Parts, thresholds and questions were committed before any row was made; a test compares them with
-that commit, whose files also say what each question measures and where yes ends.
+Parts, thresholds and questions, in `worlds.toml`, were committed before any row was made; a test
+compares them with that commit, whose files also say what each question measures and where yes ends.
 
 A place (a scenario, a layout, a sequence of layouts) is the unit: seeds are averaged first, and
 intervals are over places. Two arms with one seed meet the same noise. Costs are of rollouts without
