@@ -21,10 +21,9 @@ from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Ipopt, Program, reorder
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Asked, Prepared, Solver
-from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
+from nmpcrl.control.solvers.starts import LAST, MOST, cold_inputs, random_inputs
 from nmpcrl.control.vectors import positive_integer
 
-PERTURBED = 4  # starts from random inputs, after everything else
 SEVERAL = 5  # cold starts besides the one that feedback holds
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
@@ -111,7 +110,7 @@ class Compiled:
         self.tolerance = solver.tolerance
         N, others = problem.horizon, cold_inputs(problem, problem.horizon, solver.starts - 1)
         self.others = np.reshape(np.array(others), (-1, N, problem.inputs))
-        self.drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
+        self.drawn = np.array([random_inputs(problem, k, N) for k in range(LAST)])
         sides = [
             (state, sign, limit[state])
             for sign, limit in ((-1.0, problem.state_lower), (1.0, problem.state_upper))

@@ -7,6 +7,8 @@ from scipy.special import erfinv
 
 from nmpcrl.control import Fatrop, Nmpc, Plant, Riccati, SolverError, Task
 from nmpcrl.control.solvers.nlpsol import Program
+from nmpcrl.control.solvers.riccati import Compiled
+from nmpcrl.control.solvers.starts import LAST
 from nmpcrl.report.trace import interpreted
 from nmpcrl.study import paper
 
@@ -93,3 +95,10 @@ def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(recwarn):
     assert nmpc.task.stage_cost(state, action) == pytest.approx(cost)
     (said,) = (str(one.message) for one in recwarn if WARNING in str(one.message))
     assert "OP_ERFINV" in said
+
+
+@pytest.mark.parametrize("starts", [1, 6, 12, 64])
+def test_no_start_is_tried_twice(starts):
+    compiled = Compiled(paper.nmpc().ocp, None, Riccati(starts=starts))
+    tried = {one.tobytes() for one in (*compiled.others, *compiled.drawn)}
+    assert len(tried) == starts - 1 + LAST
