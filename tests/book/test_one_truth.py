@@ -19,8 +19,9 @@ each_page = pytest.mark.parametrize("page", PAGES)
 
 CLAIM = r"[BCW]\d"
 LISTED = rf"\(({CLAIM}(?:(?:, | and ){CLAIM})*)\)"
-COUNTED = re.compile(rf"(?:\w+ (?:is|are)|for \w+) ([a-z][a-z ]*[a-z]) {LISTED}")
-TITLED = re.compile(rf"\b({CLAIM}) ((?:partly |not )?reproduced|not decidable here):")
+OUTCOME = "((?:partly |not )?reproduced|not decidable here)"
+COUNTED = re.compile(rf"(?:\w+ (?:is|are)|for \w+) {OUTCOME} {LISTED}")
+TITLED = re.compile(rf"\b({CLAIM}) {OUTCOME}:")
 TIME = re.compile(
     r"(RDES|GES) t(?:akes|ook) (\d\.\d\d)(?: \[[\d., ]+\])? of (?:the time of )?(?:a step of )?ES"
     r" (?:with (Ipopt|fatrop|riccati)|\(C[34])"
