@@ -61,17 +61,17 @@ def test_the_package_works_where_the_wheel_is_unpacked(wheel, tmp_path):
 
 EXAMPLE = re.findall(r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), re.M | re.S)[0]
 OF_EXTRA = {  # what runs with each
-    "": EXAMPLE + EXAMPLE.replace(', solver="fatrop"', ""),
+    "": EXAMPLE + EXAMPLE.replace("Nmpc(problem)", 'Nmpc(problem, solver="ipopt")'),
     "[gymnasium]": EXAMPLE + """
 from nmpcrl.learning import as_gymnasium
-env = as_gymnasium(nmpc, plant=problem.plant(), start=[0.0])
+env = as_gymnasium(Nmpc(problem), plant=problem.plant(), start=[0.0])
 result.policy.predict(env.reset(seed=0)[0])
 """,
     "[torch]": EXAMPLE + """
 import torch
 from nmpcrl.torch import Layer
 theta = torch.tensor(result.vector, requires_grad=True)
-Layer(nmpc)([[0.5]], theta)[0].sum().backward()
+Layer(Nmpc(problem))([[0.5]], theta)[0].sum().backward()
 assert theta.grad[1] == 1
 """,
     "[study]": """
@@ -102,7 +102,11 @@ def test_each_extra_brings_what_its_part_needs(extra, wheel, tmp_path):
     taken = _megabytes(tmp_path / "bare") - before
     assert extra or taken < BARE
     done = subprocess.run(  # -I: without this folder, the user's packages and PYTHONPATH
-        [python, "-I", "-c", OF_EXTRA[extra]], cwd=tmp_path, capture_output=True, text=True
+        [python, "-I", "-c", OF_EXTRA[extra]],
+        cwd=tmp_path,
+        env=os.environ | {"NMPCRL_RUNS": str(tmp_path / "runs")},
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
 
