@@ -118,7 +118,7 @@ MUTANTS = (  # a file, a part of one of its lines, and the mistake in its place
     ("claims/robustness.py", "(all_yes - yes, all_of - of)", "(all_yes, all_of)"),
     ("claims/failure_modes.py", "paper.GAMMA * bias / delta", "bias / delta"),
     ("claims/finding.py", "runs[THETA[-1]] >=", "runs[THETA[0]] >="),
-    ("claims/reproduce.py", "- 1) > EXACT", "- 1) > 1e3 * EXACT"),
+    ("studies/reproduce.py", "- 1) > EXACT", "- 1) > 1e3 * EXACT"),
     ("studies/difficulty.py", "b[1] ** 2 / 2", "b[1] ** 2"),
     ("studies/worlds.py", "there[0] + 1 - first", "there[0] - first"),
     ("studies/worlds.py", "series[first - 1] + BACK", "series[first - 1]"),

@@ -36,6 +36,11 @@ class Estimate:
         return f"{format(self.value, form)} [{low}, {high}]"
 
 
+def count(yes: pd.Series) -> tuple[int, int]:
+    """The number of answers that are yes, and of all."""
+    return int(yes.sum()), len(yes)
+
+
 @cache
 def rate(yes: int, of: int) -> Estimate:
     """The share of independent runs that answer yes, with Wilson's interval.
@@ -97,8 +102,8 @@ def over_layouts(statistic: Callable[..., Any], *columns: Vector) -> Estimate:
     Draws in which it is nan or infinite do not count.
     """
     rows = np.stack(columns)
-    count, rng = rows.shape[1], np.random.default_rng(SEED)
-    drawn = np.asarray(statistic(*rows[:, rng.integers(count, size=(RESAMPLES, count))]))
+    units, rng = rows.shape[1], np.random.default_rng(SEED)
+    drawn = np.asarray(statistic(*rows[:, rng.integers(units, size=(RESAMPLES, units))]))
     if drawn.shape != (RESAMPLES,):
         raise ValueError(f"a statistic of shape {drawn.shape}: one over the last axis is needed")
     known = drawn[np.isfinite(drawn)]

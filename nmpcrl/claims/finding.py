@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.rows import THETA
+from nmpcrl.analysis.statistics import count
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Ending, ending
-from nmpcrl.claims.investigation import counted
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.thresholds import cost_reduction, solved, was_stopped, worsens
 from nmpcrl.learning.rollout import evaluate
@@ -43,8 +43,8 @@ def finding(found: Published) -> "pd.Series[Any]":
     riccati = found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]
     numbers = {
         # runs of `LEARNERS` with open gaps that solve their layout, and such with a closed gap
-        "arrived_open": counted(arrived[~closed]),
-        "arrived_closed": counted(arrived[closed]),
+        "arrived_open": count(arrived[~closed]),
+        "arrived_closed": count(arrived[closed]),
         "open_in": tuple(runs.layout[~closed].unique()),  # layouts of runs with open gaps
         "closed_in": tuple(runs.layout[closed].unique()),
         # median reduction of the noise-free cost by runs with open gaps that solve their layout
@@ -53,7 +53,7 @@ def finding(found: Published) -> "pd.Series[Any]":
         # than any run of `LEARNERS` in the end; its median reduction there and that of the runs;
         # the least and largest increase of the cost in the others
         "by_hand": (len(there), len(hand)),
-        "better": counted(there.saved > most),
+        "better": count(there.saved > most),
         "saved_by_hand": float(there.saved.median()),
         "saved_there": float(runs.saved[runs.layout.isin(there.index)].median()),
         "lost_by_hand": (float(lost.min()), float(lost.max())),
@@ -64,9 +64,9 @@ def finding(found: Published) -> "pd.Series[Any]":
         "early_per_step": early_per_step,
         # by learner: runs that did not end at the target, that cost more than theta_init, and that
         # cost more by more than `BETTER`
-        "not_there": {name: counted(one.ending != Ending.ARRIVED) for name, one in each.items()},
-        "above": {name: counted(one.saved < 0) for name, one in each.items()},
-        "worse": {name: counted(worsens(one)) for name, one in each.items()},
+        "not_there": {name: count(one.ending != Ending.ARRIVED) for name, one in each.items()},
+        "above": {name: count(one.saved < 0) for name, one in each.items()},
+        "worse": {name: count(worsens(one)) for name, one in each.items()},
         "seconds": 3600 * float(riccati),  # of one core, a run of ES with the compiled solver
         "hours": paper.EPISODES * paper.STEPS * paper.nmpc().plant.period / 3600,  # of motion a run
     }
@@ -88,4 +88,4 @@ def _stopped(main: pd.DataFrame, decay: str) -> tuple[Count, int]:
     """Stopped runs of RDES in one reading, and how many were stopped within `EARLY` episodes."""
     rdes = main[(main.learner == "RDES") & (main.decay == decay)]
     stopped = was_stopped(rdes)
-    return counted(stopped), int((rdes.steps_done[stopped] <= EARLY * paper.STEPS).sum())
+    return count(stopped), int((rdes.steps_done[stopped] <= EARLY * paper.STEPS).sum())

@@ -1,4 +1,4 @@
-"""The published study of layouts A to F, in `book/published`, and the runs of a chapter.
+"""The published study of layouts A to F, in `book/published`.
 
 - `runs.csv`: one row a run, `rows.row`, with its part of the study, its key and its failure mode;
 - `runs.npz`: the arrays that figures need, in the same order: training cost by episode, cost and
@@ -7,8 +7,7 @@
 - `searches.csv`: the best theta that `analysis.search` finds in each layout;
 - `timings.csv`: of `time_learners`, for the verdicts on time.
 
-The verdicts are computed from these when they are read. A chapter rests on published runs, or on
-runs that are trained here.
+The verdicts are computed from these when they are read.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,7 +23,6 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, THETA, cost_ratios, experiment_of, row
 from nmpcrl.analysis.search import Search, SearchResult
-from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import assumptions
 from nmpcrl.claims.assumptions import Measurement
@@ -36,8 +34,7 @@ from nmpcrl.claims.verdict import Verdict
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design
 from nmpcrl.study import published as store
-from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.parameters import one_of
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.provenance import EPOCHS, summary_key
 from nmpcrl.study.published import Damaged as Damaged
 from nmpcrl.study.published import folder as folder
@@ -236,28 +233,6 @@ def _outline(e: Experiment, row: Mapping[str, Any], curves: Mapping[str, Column]
     return RunSummary(asdict(e), episodes, evaluations, states, no_actions, facts)
 
 
-def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
-    """The runs of `design.main_table` to train here, and the run with theta frozen beside each.
-
-    The source is "fresh" for all runs, or "published" for the runs that are not published.
-    """
-    one_of(("published", "fresh")).check("study", source)
-    runs, known = _asked(**asked), load().summaries
-    return tuple(e for e in runs if source == "fresh" or e not in known)
-
-
-def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
-    """The runs of a chapter; runs of `needed` are trained if they are not stored.
-
-    With `variants` the published controls and variants are added.
-    """
-    runs, known = dict.fromkeys(_asked(**asked), design.MAIN_TABLE), load()
-    parts = {e: part for e, part in known.variants.items() if part != design.MAIN_TABLE}
-    parts = (parts if variants else {}) | runs
-    found = known.joined(fetch_summaries(needed(source, **asked)), runs).among(parts)
-    return replace(found, runs=found.runs.assign(variant=[*parts.values()]))
-
-
 def with_inputs(found: Evidence) -> Evidence:
     """The finished runs with the inputs of their last rollouts, solved for from the final theta.
 
@@ -277,8 +252,3 @@ def _inputs(experiment: Experiment, theta: Vector) -> Column:
     actions = evaluate(controller_of(experiment), theta, experiment.steps).actions
     missing = ((0, experiment.steps - len(actions)), (0, 0))
     return np.pad(actions, missing, constant_values=np.nan)
-
-
-def _asked(**asked: Any) -> tuple[Experiment, ...]:
-    runs = design.main_table(**asked)
-    return tuple(dict.fromkeys((*runs, *map(frozen_arm, runs))))

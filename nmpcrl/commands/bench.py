@@ -41,8 +41,8 @@ def _print_times(length: str, *, again: bool) -> None:
 
 def _publish_timing() -> None:
     """Measure and publish the verdicts on time, if they can be decided on this machine."""
-    from nmpcrl.claims.publish import publish_timing
     from nmpcrl.claims.verdict import UNDECIDABLE
+    from nmpcrl.studies.main_study import publish_timing
 
     judged = publish_timing()
     for verdict in judged:

@@ -11,7 +11,7 @@ from nmpcrl.commands.options import WORKERS
 if TYPE_CHECKING:
     import pandas as pd
 
-    from nmpcrl.claims.investigation import Investigation
+    from nmpcrl.studies.investigation import Investigation
 
 BOOK = {  # the investigations of the book, in `nmpcrl.studies`
     "agents": "agents:SAC_AND_TD3",
@@ -73,7 +73,7 @@ def investigate(
 
 def _load(name: str) -> "Investigation":
     """An investigation by its name in `BOOK`, or of a file."""
-    from nmpcrl.claims.investigation import of_file
+    from nmpcrl.studies.investigation import of_file
 
     if name in BOOK:
         found: Investigation = resolve_name(f"nmpcrl.studies.{BOOK[name]}")
@@ -99,7 +99,7 @@ def _report(one: "Investigation", parts: tuple[str, ...]) -> None:
 
 def _say(one: "Investigation", table: "pd.DataFrame") -> None:
     """The answer to each question, and the expected one where it differs."""
-    from nmpcrl.claims.investigation import WORDS
+    from nmpcrl.studies.investigation import WORDS
 
     for question, answer in zip(one.questions, one.answers(table).values(), strict=True):
         counts = {**answer.counts, **answer.beside}

@@ -64,7 +64,7 @@ def study(
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: written")
     if publish:
-        from nmpcrl.claims.publish import publish_study
+        from nmpcrl.studies.main_study import publish_study
 
         click.echo(f"{publish_study(found, wanted, anew=not parts)}: published")
         _judge()

@@ -19,7 +19,8 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
       nmpcrl verify --sample 5
     """
     from nmpcrl.analysis import summaries
-    from nmpcrl.claims import published, reproduce
+    from nmpcrl.claims import published
+    from nmpcrl.studies import reproduce
     from nmpcrl.study.parameters import whole
 
     known = published.load()

@@ -2,8 +2,7 @@
 
 import pandas as pd
 
-from nmpcrl.analysis.statistics import Estimate
-from nmpcrl.claims.investigation import counted
+from nmpcrl.analysis.statistics import Estimate, count
 from nmpcrl.claims.thresholds import improves
 from nmpcrl.studies.difficulty import OPEN, PILOT
 from nmpcrl.studies.population import CLAIMS, EXPECTED, Drawn
@@ -31,7 +30,7 @@ def at_the_gap(found: Drawn) -> pd.DataFrame:
 def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
     """Runs of `at_the_gap` that improve, and all, where a gap ended open, and where closed."""
     ways = {"open": ends.gap & ~ends.closed, "closed": ends.closed}
-    return {way: counted(ends.improves[there]) for way, there in ways.items()}
+    return {way: count(ends.improves[there]) for way, there in ways.items()}
 
 
 def label(claim: str) -> str:

@@ -18,7 +18,6 @@ from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims import published as study
 from nmpcrl.claims import robustness
 from nmpcrl.claims.finding import finding
-from nmpcrl.claims.investigation import WORDS, Answer, Investigation
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import RUNS, SEARCHES, TIMINGS
@@ -30,6 +29,8 @@ from nmpcrl.studies import interventions, population, remedies
 from nmpcrl.studies.agents import SAC_AND_TD3
 from nmpcrl.studies.difficulty import DIFFICULTY
 from nmpcrl.studies.interventions import INTERVENTIONS
+from nmpcrl.studies.investigation import WORDS, Answer, Investigation
+from nmpcrl.studies.main_study import gather
 from nmpcrl.studies.other_problems import OTHER_PROBLEMS
 from nmpcrl.studies.population import POPULATION
 from nmpcrl.studies.remedies import REMEDIES
@@ -312,7 +313,7 @@ MEDIANS: Mapping[str, Mapping[str, str]] = {  # numbers of verdicts, in words
 
 def _variants() -> list[Line]:
     """How many variants change a verdict of the paper's claims."""
-    every = study.gather("published", variants=True)
+    every = gather("published", variants=True)
     judged = robustness.variant_changes(every.runs, every.paths)
     changed = judged[judged.changes.astype(bool)]
     of, group = judged.variant.nunique(), "Variants"

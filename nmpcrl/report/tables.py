@@ -10,8 +10,6 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.investigation import WORDS as INVESTIGATED
-from nmpcrl.claims.investigation import Answer, Question
 from nmpcrl.claims.paper_claims import CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Claim, anew
 from nmpcrl.claims.verdict import (
@@ -25,6 +23,8 @@ from nmpcrl.claims.verdict import (
 )
 from nmpcrl.report.cited import cited
 from nmpcrl.report.text import SURE, departure_link
+from nmpcrl.studies.investigation import WORDS as INVESTIGATED
+from nmpcrl.studies.investigation import Answer, Question
 from nmpcrl.study.departures import DEPARTURES
 
 BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome

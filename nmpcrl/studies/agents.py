@@ -20,8 +20,8 @@ import pandas as pd
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import HELD_OUT, TOLERANCE, Entry
-from nmpcrl.claims.investigation import Answer, Investigation, Part, cheaper, questions, share
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
+from nmpcrl.studies.investigation import Answer, Investigation, Part, cheaper, questions, share
 from nmpcrl.studies.remedies import REMEDIES
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.provenance import EPOCHS

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from nmpcrl import Vector
 from nmpcrl.analysis.suite import LAYOUTS, THETA, Entry, Policy, Robot, followed
-from nmpcrl.claims.investigation import Row
+from nmpcrl.studies.investigation import Row
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.geometry import Centres

@@ -23,9 +23,9 @@ from scipy import optimize, stats
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.statistics import over_layouts
 from nmpcrl.analysis.trajectory import closes_at
-from nmpcrl.claims.investigation import Investigation, Part, Row
 from nmpcrl.control import Task
 from nmpcrl.learning.rollout import evaluate
+from nmpcrl.studies.investigation import Investigation, Part, Row
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import COMPARED, LAYOUTS
 from nmpcrl.study.geometry import Centres

@@ -23,10 +23,10 @@ import pandas as pd
 from nmpcrl.analysis.extrapolation import watch
 from nmpcrl.analysis.statistics import Estimate, over_layouts
 from nmpcrl.claims import published
-from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, Row, share
 from nmpcrl.claims.thresholds import was_stopped
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.studies import population
+from nmpcrl.studies.investigation import Answer, Investigation, Part, Question, Row, share
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import LAYOUTS, name_of
 from nmpcrl.study.experiment import Experiment

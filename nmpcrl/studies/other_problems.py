@@ -17,11 +17,11 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Matrix, Vector, learning
-from nmpcrl.claims.investigation import Answer, Investigation, Part, Row, questions
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, td_error, train
 from nmpcrl.studies import dynamic_programming
+from nmpcrl.studies.investigation import Answer, Investigation, Part, Row, questions
 from nmpcrl.study.problems import gros_zanon as gz
 
 STEPS, WINDOW = 1000, 50  # of a run, and those whose costs are averaged

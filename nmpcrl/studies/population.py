@@ -19,22 +19,10 @@ import pandas as pd
 
 from nmpcrl.analysis import trap
 from nmpcrl.analysis.rows import OUTCOME, as_text, cost_ratios, row
-from nmpcrl.analysis.statistics import rate
+from nmpcrl.analysis.statistics import count, rate
 from nmpcrl.analysis.summaries import SUMMARIES
 from nmpcrl.claims import published as six
 from nmpcrl.claims.by_runs import RunClaim
-from nmpcrl.claims.investigation import (
-    NAMES,
-    Answer,
-    Investigation,
-    Part,
-    Question,
-    Row,
-    above,
-    counted,
-    questions,
-    share,
-)
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import BY_RUNS, WIDER_CLAIMS
 from nmpcrl.claims.robustness import groups
@@ -43,6 +31,17 @@ from nmpcrl.claims.thresholds import was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.studies import difficulty
 from nmpcrl.studies.difficulty import predictor_scores
+from nmpcrl.studies.investigation import (
+    NAMES,
+    Answer,
+    Investigation,
+    Part,
+    Question,
+    Row,
+    above,
+    questions,
+    share,
+)
 from nmpcrl.study import paper, published
 from nmpcrl.study.design import MAIN_TABLE, sweep
 from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS, TUNE, name_of
@@ -308,8 +307,8 @@ def closing_gaps(layouts: pd.DataFrame, judged: pd.Series) -> Answer:
     """The answer of the measures of layouts, and of whether ES improves in each."""
     closes = layouts.loc[judged.index, difficulty.PILOT] < CLOSES_BEFORE
     counts = {
-        "layouts fail where it closes": counted(~judged[closes]),
-        "layouts succeed elsewhere": counted(judged[~closes]),
+        "layouts fail where it closes": count(~judged[closes]),
+        "layouts succeed elsewhere": count(judged[~closes]),
     }
     outcomes = {read(*count) for count in counts.values()}
     worst = next(one for one in (NOT, UNDECIDABLE, PARTLY, REPRODUCED) if one in outcomes)
@@ -352,8 +351,8 @@ def caught(runs: pd.DataFrame, yes: str) -> Answer:
     """
     away = runs[(runs.learner == "ES") & (runs.distance > ARRIVED)]
     answers = away.eval(yes)
-    count = counted(answers.groupby(away.layout).all())
-    return Answer(read(*count), {"layouts": count, "runs": counted(answers)})
+    layouts = count(answers.groupby(away.layout).all())
+    return Answer(read(*layouts), {"layouts": layouts, "runs": count(answers)})
 
 
 def early_overshoot(runs: pd.DataFrame) -> Answer:
@@ -363,7 +362,7 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
     early = stopped.steps_done < DEAD_BY * stopped.steps
     signs = pd.DataFrame({"layouts overshot": stopped.over > 0, "layouts early": early})
     most = signs.groupby(stopped.layout).mean() > MAJORITY
-    counts = {str(name): counted(most[name]) for name in most}
+    counts = {str(name): count(most[name]) for name in most}
     beside = {"runs stopped": (len(stopped), len(rdes))}
     if stopped.empty:
         return Answer(UNDECIDABLE, counts, beside=beside)

@@ -26,21 +26,20 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis import suite
-from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
+from nmpcrl.analysis.statistics import Estimate, count, interquartile_mean, rate
 from nmpcrl.analysis.suite import ENTRIES, Entry, judge, seed_of
-from nmpcrl.claims.investigation import (
+from nmpcrl.claims.rule import MAJORITY
+from nmpcrl.claims.verdict import PARTLY, UNDECIDABLE
+from nmpcrl.studies.investigation import (
     Answer,
     Condition,
     Investigation,
     Part,
     Row,
     above,
-    counted,
     questions,
     share,
 )
-from nmpcrl.claims.rule import MAJORITY
-from nmpcrl.claims.verdict import PARTLY, UNDECIDABLE
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.refusal import Refusal
 
@@ -338,7 +337,7 @@ def _difference(first: str, second: str, table: pd.DataFrame) -> Answer:
     return Answer(
         outcome,
         numbers={"difference": found.value, "low": found.low, "high": found.high},
-        beside={"layouts with more": counted(more > 0)},
+        beside={"layouts with more": count(more > 0)},
         said=NO_DIFFERENCE if outcome == PARTLY else "",
     )
 

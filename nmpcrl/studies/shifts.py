@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.analysis.suite import entry, judge
-from nmpcrl.claims.investigation import Row
 from nmpcrl.control import Nmpc
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, expected_sarsa, train
 from nmpcrl.learning.network import QNetwork, machine_code
 from nmpcrl.learning.training import absurd
+from nmpcrl.studies.investigation import Row
 from nmpcrl.studies.worlds_run import THETA, controller, exploration, row
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.drawn import JUDGE

@@ -20,8 +20,11 @@ from scipy.stats import rankdata
 
 from nmpcrl.analysis.encounters import crowding
 from nmpcrl.analysis.suite import scenario_seed
-from nmpcrl.claims import investigation
-from nmpcrl.claims.investigation import (
+from nmpcrl.claims.rule import read
+from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.studies import investigation
+from nmpcrl.studies import worlds_run as runs
+from nmpcrl.studies.investigation import (
     Answer,
     Investigation,
     Part,
@@ -31,9 +34,6 @@ from nmpcrl.claims.investigation import (
     questions,
     share,
 )
-from nmpcrl.claims.rule import read
-from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.studies import worlds_run as runs
 from nmpcrl.studies.shifts import EVERY, sequence, shifting
 from nmpcrl.studies.worlds_run import TERMINALS
 from nmpcrl.study.drawn import COMPARED, JUDGE, SCENARIOS

@@ -15,12 +15,12 @@ from nmpcrl import Vector
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.analysis.search import cma_es, grid
 from nmpcrl.analysis.suite import Robot, entry
-from nmpcrl.claims.investigation import Condition, Row
 from nmpcrl.control import Nmpc
 from nmpcrl.control.problem import Parameter
 from nmpcrl.learning import Diverged, Exploration, Weights, expected_sarsa, train
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import absurd
+from nmpcrl.studies.investigation import Condition, Row
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.faults import FAULTS, Fault, robot

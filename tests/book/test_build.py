@@ -268,7 +268,8 @@ CONTRADICTION = (
 
 def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
     """Of times, right after they were measured."""
-    from nmpcrl.claims import published, reproduce
+    from nmpcrl.claims import published
+    from nmpcrl.studies import reproduce
 
     monkeypatch.setattr(published, "load", published.Published)
     monkeypatch.setattr(reproduce, "of_times", lambda timings, known: (timings,))

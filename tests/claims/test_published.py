@@ -12,10 +12,11 @@ from builders import timings
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.search import Search, SearchResult
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.claims import publish, published
+from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import Measurement
 from nmpcrl.claims.published import FOLLOWED, Published, load
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.studies import main_study
 from nmpcrl.study import Experiment, paper, run, sweep
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import frozen_arm
@@ -61,9 +62,9 @@ def known(summaries, folder) -> Published:
 
 
 def publish_all(summaries) -> None:
-    publish.publish_runs(summaries, LABELS, anew=True, audit=AUDIT)
-    publish.publish_times(TIMES)
-    publish.publish_searches(SEARCHES)
+    main_study.publish_runs(summaries, LABELS, anew=True, audit=AUDIT)
+    main_study.publish_times(TIMES)
+    main_study.publish_searches(SEARCHES)
 
 
 def forget() -> None:
@@ -106,7 +107,7 @@ def test_searches_times_and_their_origin_are_read_as_they_were(known):
 def test_the_same_content_gives_the_same_bytes_and_nothing_of_the_earlier(known, summaries, folder):
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     fewer = [RUNS[0], frozen_arm(RUNS[0])]
-    publish.publish_runs({e: summaries[e] for e in fewer}, LABELS, anew=True)
+    main_study.publish_runs({e: summaries[e] for e in fewer}, LABELS, anew=True)
     assert list(load().rows) == fewer
     shutil.rmtree(folder)
     forget()
@@ -119,7 +120,7 @@ FURTHER = Experiment("ES", alpha=2e-7, **SMALL)
 
 def test_further_runs_are_added_and_the_published_ones_stay(known, folder):
     made = summarise(run(FURTHER))
-    publish.publish_runs({FURTHER: made}, {FURTHER: "alpha x 2"})
+    main_study.publish_runs({FURTHER: made}, {FURTHER: "alpha x 2"})
     forget()
     found = load()
     assert list(found.rows) == [*RUNS, FURTHER]
@@ -143,7 +144,7 @@ def test_further_runs_are_added_and_the_published_ones_stay(known, folder):
 def test_runs_that_cannot_stand_beside_the_others_are_refused(known, experiment, part, refusal):
     made = summarise(run(experiment))
     with pytest.raises(Unpublishable, match=refusal):
-        publish.publish_runs({experiment: made}, {experiment: part})
+        main_study.publish_runs({experiment: made}, {experiment: part})
     assert list(load().rows) == list(RUNS)
 
 
@@ -154,8 +155,8 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
     audit, main = replace(AUDIT, kinks=0.2), {e: LABELS[e] for e in RUNS if LABELS[e] == "main"}
     anew = {e: scaled(summaries[e], 2.0) for e in main}
     with pytest.raises(Unpublishable, match=r"is missing: the part 'main' is of earlier epochs"):
-        publish.publish_runs(dict([*anew.items()][1:]), main)
-    publish.publish_runs(anew, main, audit=audit)
+        main_study.publish_runs(dict([*anew.items()][1:]), main)
+    main_study.publish_runs(anew, main, audit=audit)
     forget()
     found = load()
     assert list(found.rows) == list(RUNS)
@@ -171,7 +172,7 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
         found.runs.seconds.sum() / 3600
     )
     with pytest.raises(Unpublishable, match="is published already, in the part 'main'"):
-        publish.publish_runs(anew, main)
+        main_study.publish_runs(anew, main)
 
 
 def scaled(one, factor):
@@ -185,10 +186,10 @@ def test_times_are_published_if_they_decide_all_claims_about_time(
     known, monkeypatch, width, outcomes
 ):
     monkeypatch.setattr(
-        publish,
+        main_study,
         "time_learners_repeatedly",
         lambda: timings(0.65, width=width, waited=0.5, solvers=["ipopt"]),
     )
-    assert [verdict.outcome for verdict in publish.publish_timing()] == outcomes
+    assert [verdict.outcome for verdict in main_study.publish_timing()] == outcomes
     assert (len(load().timings) == 3) == (UNDECIDABLE not in outcomes)
     assert list(load().rows) == list(RUNS)

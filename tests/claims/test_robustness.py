@@ -7,7 +7,6 @@ from builders import quiet_row
 
 from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.analysis.statistics import paired_p
-from nmpcrl.claims import published
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import (
     WHOLE,
@@ -18,6 +17,7 @@ from nmpcrl.claims.robustness import (
 from nmpcrl.claims.rule import judge
 from nmpcrl.claims.thresholds import divergence
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
+from nmpcrl.studies.main_study import gather
 from nmpcrl.study import Experiment, design
 from nmpcrl.study.experiment import PAPER
 
@@ -94,7 +94,7 @@ def test_a_part_changes_a_verdict_only_if_the_parts_differ(other, changes):
 
 
 def test_how_often_des_diverges_is_tested_on_its_own_and_not_by_the_p_of_the_claim():
-    known = published.gather("published", variants=True)
+    known = gather("published", variants=True)
     versions, runs = readings_of_des(known.runs, known.paths), known.runs
     assert list(versions.index) == ["lagged", "averaged", "greedy", "late"]
     found = versions.loc["averaged"]

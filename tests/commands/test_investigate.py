@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from nmpcrl.claims.investigation import of_file
+from nmpcrl.studies.investigation import of_file
 from nmpcrl.study import published
 from nmpcrl.study.refusal import Refusal
 

@@ -8,7 +8,8 @@ import pytest
 from builders import raising
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
-from nmpcrl.claims import publish, published
+from nmpcrl.claims import published
+from nmpcrl.studies import main_study
 from nmpcrl.study import design, store, sweep
 
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
@@ -25,8 +26,8 @@ def small(monkeypatch, timings, trains_here):
     """A study of six short runs, trained in this process, without searches and measured times."""
     times = timings
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
-    monkeypatch.setattr(publish, "search_all", lambda _: SEARCHED)
-    monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
+    monkeypatch.setattr(main_study, "search_all", lambda _: SEARCHED)
+    monkeypatch.setattr(main_study, "time_learners_repeatedly", lambda: times)
 
 
 @pytest.fixture(scope="module")

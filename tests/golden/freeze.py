@@ -27,7 +27,6 @@ from nmpcrl.claims import (
     paper_claims,
     prespecified,
     published,
-    reproduce,
     robustness,
     rule,
     thresholds,
@@ -35,7 +34,16 @@ from nmpcrl.claims import (
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import drawn as drawn_report
 from nmpcrl.report import worlds as world_report
-from nmpcrl.studies import agents, interventions, other_problems, population, remedies, worlds
+from nmpcrl.studies import (
+    agents,
+    interventions,
+    main_study,
+    other_problems,
+    population,
+    remedies,
+    reproduce,
+    worlds,
+)
 from nmpcrl.studies.difficulty import predictor_scores
 from nmpcrl.study import design, paper, provenance
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
@@ -71,7 +79,7 @@ trained = cache(lambda: agents.SAC_AND_TD3.table())
 changing = cache(lambda: worlds.WORLDS.table())
 again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
-every = cache(lambda: published.gather("published", variants=True))
+every = cache(lambda: main_study.gather("published", variants=True))
 six_paths = cache(lambda: every().paths)
 raised = cache(population.raised)
 

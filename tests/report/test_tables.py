@@ -9,12 +9,12 @@ from bs4 import BeautifulSoup
 
 from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.analysis.statistics import Estimate
-from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.report import agents, remedies, tables, timing, worlds
 from nmpcrl.report.drawn import at_the_gap, improve_by_gap, share_table
 from nmpcrl.studies.agents import SAC_AND_TD3, course
 from nmpcrl.studies.difficulty import OPEN
+from nmpcrl.studies.investigation import Answer
 from nmpcrl.studies.population import Drawn, shares
 from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, REMEDIES, RemedyRow
 from nmpcrl.studies.worlds import ORACLES, VIEWS

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from history import INVESTIGATIONS
 
-from nmpcrl.claims.investigation import Condition, rounded
+from nmpcrl.studies.investigation import Condition, rounded
 from nmpcrl.study.learners import LEARNERS
 
 DRAWN = 5

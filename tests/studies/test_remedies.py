@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.suite import ENTRIES
-from nmpcrl.claims.investigation import Condition, rounded
 from nmpcrl.claims.verdict import UNDECIDABLE
 from nmpcrl.studies import remedies
+from nmpcrl.studies.investigation import Condition, rounded
 from nmpcrl.studies.remedies import FIRST, LATER, NEVER, OPEN, PARTS, REMEDIES, SECOND, arms
 
 RUN = {

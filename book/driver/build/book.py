@@ -12,7 +12,7 @@ Each build has its own place, in the last column, and six steps, each a function
               the machine to itself. A build without `book/published` ends here, too
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
-              the published ones end the build, and so do verdicts, as `claims.reproduce` says.
+              the published ones end the build, and so do verdicts, as `studies.reproduce` says.
               What the live figures solve with is compiled meanwhile
 4. `execute`  the chapters with papermill into PLACE/executed: make has a rule a chapter, so what
               nothing has made stale is not executed again

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from driver.project import Failure
 
 if TYPE_CHECKING:
-    from nmpcrl.claims.reproduce import Pairs
     from nmpcrl.claims.verdict import Verdict
+    from nmpcrl.studies.reproduce import Pairs
 
 
 def require_published() -> None:
@@ -48,7 +48,8 @@ def compile_for_pages() -> None:
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_summaries
-    from nmpcrl.claims import published, reproduce
+    from nmpcrl.claims import published
+    from nmpcrl.studies import reproduce
     from nmpcrl.study import Experiment
     from nmpcrl.study.lock import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
@@ -69,7 +70,8 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
 
 def measure(calls: tuple[Callable[[], Any], ...]) -> None:
     """Time the learners with the machine to itself; times have their verdicts, too."""
-    from nmpcrl.claims import published, reproduce
+    from nmpcrl.claims import published
+    from nmpcrl.studies import reproduce
 
     for call in calls:
         refuse_verdicts(reproduce.of_times(call().timings, published.load()))

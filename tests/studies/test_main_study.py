@@ -5,8 +5,8 @@ import pytest
 
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.claims import publish, published
-from nmpcrl.claims.published import gather, needed
+from nmpcrl.claims import published
+from nmpcrl.studies.main_study import gather, needed, publish_runs
 from nmpcrl.study.design import main_table
 from nmpcrl.study.experiment import frozen_arm
 
@@ -26,7 +26,7 @@ def known():
     """ES and its frozen arm, both readings of the decay, published."""
     runs = main_table(["ES", "frozen"], ["A"], [0], 2)
     summaries = fetch_summaries(runs, progress=False)
-    publish.publish_runs(summaries, dict.fromkeys(runs, "main"), anew=True)
+    publish_runs(summaries, dict.fromkeys(runs, "main"), anew=True)
     return summaries
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.investigation import NAMES, Answer, Investigation, Part, Question, lower, means
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE
+from nmpcrl.studies.investigation import NAMES, Answer, Investigation, Part, Question, lower, means
 from nmpcrl.study import published
 from nmpcrl.study.provenance import EPOCHS
 from nmpcrl.study.published import Damaged, Unpublishable

@@ -10,10 +10,10 @@ import pytest
 from builders import timings
 
 from nmpcrl.analysis import summaries
-from nmpcrl.claims import reproduce
 from nmpcrl.claims.published import Evidence, Published
-from nmpcrl.claims.reproduce import compare, contradictions, of_runs, of_times, relock
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.studies import reproduce
+from nmpcrl.studies.reproduce import compare, contradictions, of_runs, of_times, relock
 from nmpcrl.study import Experiment, design, lock, provenance, sweep
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.machine import fingerprint

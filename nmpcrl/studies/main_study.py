@@ -1,7 +1,7 @@
-"""Publication of the study: runs, searches, and times of steps."""
+"""The main study: runs of a chapter, published or trained here, and publication."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import pandas as pd
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.search import Search, SearchResult, search_all
+from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.learners import time_learners_repeatedly
 from nmpcrl.claims import published
@@ -21,10 +22,38 @@ from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.study import design, paper
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import Experiment, frozen_arm
+from nmpcrl.study.parameters import one_of
 from nmpcrl.study.provenance import made_here
 from nmpcrl.study.published import Unpublishable
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import fetch
+
+
+def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
+    """The runs of `design.main_table` to train here, and the run with theta frozen beside each.
+
+    The source is "fresh" for all runs, or "published" for the runs that are not published.
+    """
+    one_of(("published", "fresh")).check("study", source)
+    runs, known = _asked(**asked), published.load().summaries
+    return tuple(e for e in runs if source == "fresh" or e not in known)
+
+
+def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
+    """The runs of a chapter; runs of `needed` are trained if they are not stored.
+
+    With `variants` the published controls and variants are added.
+    """
+    runs, known = dict.fromkeys(_asked(**asked), design.MAIN_TABLE), published.load()
+    parts = {e: part for e, part in known.variants.items() if part != design.MAIN_TABLE}
+    parts = (parts if variants else {}) | runs
+    found = known.joined(fetch_summaries(needed(source, **asked)), runs).among(parts)
+    return replace(found, runs=found.runs.assign(variant=[*parts.values()]))
+
+
+def _asked(**asked: Any) -> tuple[Experiment, ...]:
+    runs = design.main_table(**asked)
+    return tuple(dict.fromkeys((*runs, *map(frozen_arm, runs))))
 
 
 def publish_study(

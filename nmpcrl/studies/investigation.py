@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 from filelock import FileLock
 
+from nmpcrl.analysis.statistics import count
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.study import published
@@ -391,17 +392,12 @@ def _commit(path: Path) -> str:
     return "" if git("status", "--porcelain") else git("log", "-1", "--format=%H")
 
 
-def counted(yes: pd.Series) -> tuple[int, int]:
-    """How many answers are yes, and how many there are."""
-    return int(yes.sum()), len(yes)
-
-
 def share(
     yes: pd.Series, unit: str = "layouts", numbers: Mapping[str, float] | None = None
 ) -> Answer:
     """The answer of a share of yes, by `rule.read`."""
-    count = counted(yes)
-    return Answer(read(*count), {unit: count}, numbers or {})
+    found = count(yes)
+    return Answer(read(*found), {unit: found}, numbers or {})
 
 
 def cheaper(ratio: pd.Series, unit: str = "layouts") -> Answer:
