@@ -77,9 +77,13 @@ WIDE = """[...document.querySelectorAll(".bd-article *")]
   .filter(one => !one.closest("mjx-assistive-mml, svg"))
   .map(one => [one, getComputedStyle(one)])"""
 
+LEFT = """[...document.querySelectorAll(".scrolls > *, .math > *")].filter(one =>
+  one.getBoundingClientRect().left < one.parentElement.getBoundingClientRect().left - 1)"""
+
 CUT = f"""() => {WIDE}
   .filter(([one, style]) => ["hidden", "clip"].includes(style.overflowX))
-  .map(([one]) => one.outerHTML.slice(0, 200))"""
+  .map(([one]) => one).concat({LEFT})
+  .map(one => one.outerHTML.slice(0, 200))"""
 
 STOPS = """() => [...document.querySelectorAll(".math, .math *")]
   .filter(one => one.tabIndex === 0 && !one.matches("a"))
@@ -105,7 +109,7 @@ class Visit:
     findings: list[str] = field(default_factory=list)  # of axe, a sentence each
     themes: list[str | None] = field(default_factory=list)  # in the order of the views
     widths: list[int] = field(default_factory=list)  # of the page on `TELEPHONES`, all open [px]
-    cut: list[str] = field(default_factory=list)  # is wider than its place and cannot scroll
+    cut: list[str] = field(default_factory=list)  # cannot scroll to all of it
     stops: list[str] = field(default_factory=list)  # a formula that takes the focus for nothing
     small: list[str] = field(default_factory=list)  # ours, and a finger may miss it
 
