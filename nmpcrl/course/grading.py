@@ -184,7 +184,7 @@ def combined(release: Notebook, handed: Notebook) -> list[Cell]:
             name = answers.get(exercise, name)
         if name in ours:
             last = name
-            given[name] = cell.source
+            given[name] = cell.source if cell.cell_type == "code" else ""  # nobody ran its text
         elif cell.cell_type == "code" and cell.source not in ours.values():
             added[last].append(cell)
     cells = [_code(one.source, f"added-{k}", f"added-{k}") for k, one in enumerate(added[""])]

@@ -59,6 +59,8 @@ def graded(tmp_path, release, runs):
 
 
 def test_points_are_lost_with_a_sentence_and_only_where_they_must(graded):
+    unrun = solved()
+    cell_of(unrun, "one-answer").cell_type = "markdown"
     lost = graded(
         "--seconds", "5", "--workers", "2",
         right=solved(),
@@ -67,6 +69,7 @@ def test_points_are_lost_with_a_sentence_and_only_where_they_must(graded):
         ends=solved(three="import os; os._exit(3)"),
         large=solved(one="root_of_one = 'x' * 10**11"),
         broken="{",
+        unrun=unrun,
     )  # fmt: skip
     assert lost["right"] == ["", "", "", ""]
     assert lost["wrong"][0] == "Take the root."
@@ -78,6 +81,7 @@ def test_points_are_lost_with_a_sentence_and_only_where_they_must(graded):
     assert lost["large"][0].startswith("It fails with MemoryError")
     assert lost["large"][1:] == ["", "", ""]
     assert lost["broken"] == ["The file is not a notebook."] * 4
+    assert lost["unrun"] == ["It fails with NameError: name 'root_of_one' is not defined", "", "", ""]
 
 
 def test_what_else_a_student_changes_does_not_matter(graded):
