@@ -6,17 +6,15 @@ published; nothing is trained. `test_golden` compares all of them with what the 
 
 import json
 import sys
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable
 from functools import cache
-from itertools import chain, product
+from itertools import product
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
-import numpy as np
 import pandas as pd
-from plain_values import array, plain, plain_name, processor, short, table
+from plain_values import plain, plain_name, processor, short, table
 
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
@@ -31,7 +29,6 @@ from nmpcrl.claims import (
     rule,
     thresholds,
 )
-from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import drawn as drawn_report
 from nmpcrl.report import worlds as world_report
 from nmpcrl.studies import (
@@ -81,34 +78,27 @@ again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
 every = cache(lambda: main_study.gather("published", variants=True))
 six_paths = cache(lambda: every().paths)
-raised = cache(population.raised)
 
 
-def by_question(answers: Iterable[Any]) -> dict[str, Any]:
-    """Outcome, counts and numbers of each answer."""
-    names = ("outcome", "counts", "numbers", "beside")
-    return {one.question: {name: getattr(one, name) for name in names} for one in answers}
-
-
-def by_claim(verdicts: Iterable[Any]) -> dict[str, Any]:
-    """Each verdict, and how many layouts drawn anew would say yes."""
+def verdicts() -> Any:
+    """Each verdict, and what it says of layouts drawn anew, of its halves and of other readings."""
     return {
         one.claim: plain(one)
         | {"halves": {f"{half.wrong}, per {half.decay}": half for half in one.halves}}
         | {"p": [half.p for half in one.halves], "turns": one.turns}
         | {"anew": rule.anew(one) if one.counts else None}
         | {"depends": [one.depends_on("layout"), one.depends_on("decay")]}
-        for one in verdicts
+        for one in study().verdicts
     }
 
 
 def other_borders() -> Any:
-    main, known = every().main.runs, {}
+    """What the borders of each claim are held against, and the outcome at each."""
+    own = study().runs[study().runs.variant.isin([design.MAIN_TABLE, "controls"])]
+    runs = dict.fromkeys(paper_claims.BY_RUNS, every().main.runs)
+    known = {}
     for name, claim in {**paper_claims.BY_RUNS, **own_claims.OWN_CLAIMS}.items():
-        runs = main if name in paper_claims.BY_RUNS else study().runs
-        if name not in paper_claims.BY_RUNS:
-            runs = runs[runs.variant.isin([design.MAIN_TABLE, "controls"])]
-        values = claim.measure(runs, six_paths())
+        values = claim.measure(runs.get(name, own), six_paths())
         known[name] = {
             "values": table(values),
             "borders": table(claim.at_borders(values, claim.borders)),
@@ -117,98 +107,41 @@ def other_borders() -> Any:
     return known
 
 
-def constraints_without_noise() -> Any:
-    kept = paper_claims.kept_without_noise(every().main.runs, PAPER)
-    return kept.groupby(level="learner", sort=False).agg(["sum", "size"])
-
-
 def costs_less_than_ges() -> Any:
     others, main = ("ES", "DES", "RDES", "TDC"), study().main.runs
     functions = (own_claims.costs_less, own_claims.costs_less_anew)
     return {name: [one(main, name, "GES") for one in functions] for name in others}
 
 
-def runs_that_went_wrong() -> Any:
-    kinds = {"diverged": thresholds.divergence, "unstable": thresholds.instability}
-    runs, found = study().main.runs, {}
-    runs = runs[runs.learner.isin(PAPER)]
-    for name, wrong in kinds.items():
-        cells = runs.assign(wrong=wrong(runs)).pivot_table(
-            "wrong", ["decay", "learner"], "layout", "sum", sort=False
-        )
-        each = runs.groupby(["decay", "learner"]).size()
-        found[name] = cells.assign(**{"all layouts": cells.sum(axis=1), "runs": each}).astype(int)
-    return found
-
-
 def answers_of_thresholds() -> Any:
-    runs = study().runs
     names = ("was_stopped", "worsens", "improves", "solved", "cost_reduction", "late_cost_range")
-    return table(pd.DataFrame({name: getattr(thresholds, name)(runs) for name in names}))
+    names += ("divergence", "instability")
+    return table(pd.DataFrame({name: getattr(thresholds, name)(study().runs) for name in names}))
 
 
 def middle_of_each_learner() -> Any:
-    runs = study().main.runs
-    left = runs.final_cost.where(runs.stopped == "finished", np.inf) / runs.initial_cost
-    groups = runs.groupby("learner").groups.items()
-    return {name: interquartile_mean(left[i], list(runs.layout[i])) for name, i in groups}
+    left = study().main.runs
+    left = left.assign(
+        share=left.final_cost.where(left.stopped == "finished", float("inf")) / left.initial_cost
+    )
+    return {name: interquartile_mean(one.share.to_numpy(), [*one.layout])
+            for name, one in left.groupby("learner")}  # fmt: skip
 
 
-def share_of_the_possible() -> Any:
+def shares_of_the_possible() -> Any:
     gains = {search.layout: found.gain for search, found in study().searches.items()}
-    shares = thresholds.share_of_possible(study().main.runs, gains)
-    return shares.groupby(study().main.runs.learner).median()
-
-
-def searches() -> Any:
-    names = ("theta", "made", "initial", "cost", "gain")
-    return {
-        f"{search.layout} {search.seed} {search.budget}": {
-            **{name: getattr(found, name) for name in names},
-            "after 200": found.after(200),
-        }
-        for search, found in study().searches.items()
-    }
-
-
-def ratios_of_times() -> Any:
-    pairs = study().timings[["solver", "learner"]].itertuples(index=False, name=None)
-    return {
-        f"{learner}, {solver}": ratio(study().timings, solver, learner) for solver, learner in pairs
-    }
+    return table(thresholds.share_of_possible(study().main.runs, gains))
 
 
 def shares_in_a_to_f() -> Any:
-    main, names = study().main.runs, list(population.EXPECTED)
     runs = study().runs[study().runs.variant == design.MAIN_TABLE]
-    assert len(main) == len(runs)
-    return population.shares(population.by_layout(runs, study().paths, names)).set_index("claim")
-
-
-def verdicts_that_stand() -> Any:
-    outcomes = {one.claim: one.outcome for one in study().verdicts}
-    found = drawn().shares
-    return {one.claim: outcomes[one.claim] == one.outcome for one in found.itertuples()
-            if one.claim in outcomes}  # fmt: skip
+    where = population.by_layout(runs, study().paths, [*population.EXPECTED])
+    return population.shares(where).set_index("claim")
 
 
 def answers() -> Any:
     found = population.POPULATION.judge(drawn())
-    return by_question(found[one.name] for one in population.QUESTIONS if one.name != "cliff")
-
-
-def other_answers() -> Any:
-    return {
-        "cliff": plain(by_question([named("cliff", population.cliff(raised()))]), RAISED),
-        "extrapolation": by_question(interventions.INTERVENTIONS.judge(again()).values()),
-        "early overshoot in A to F": by_question(
-            [named("early overshoot", population.early_overshoot(study().main.runs))]
-        ),
-    }
-
-
-def named(question: str, answer: Any) -> Any:
-    return replace(answer, question=question)
+    return {name: answer for name, answer in found.items() if name != "cliff"}
 
 
 def predictors() -> Any:
@@ -219,16 +152,6 @@ def predictors() -> Any:
     return found.assign(**{name: [plain(one, ROLLOUT) for one in found[name]] for name in fitted})
 
 
-def successes() -> Any:
-    parts = {"main": drawn().main, **dict(iter(drawn().runs.groupby("part", sort=False)))}
-    learners = ("ES", "GES")
-    return {
-        f"{learner}, {part}": [int(yes.sum()), len(yes), array(yes.to_numpy(bool))]
-        for (part, runs), learner in product(parts.items(), learners)
-        if len(yes := population.succeeds(runs, learner))
-    }
-
-
 def at_the_gap() -> Any:
     ends = drawn_report.at_the_gap(drawn())
     return {"runs": table(ends), "improve": drawn_report.improve_by_gap(ends)}
@@ -236,175 +159,82 @@ def at_the_gap() -> Any:
 
 def whole_picture_tried() -> Any:
     tried = drawn().tried
-    columns = ["setting", "layout", "decay", *population.PICTURE, "whole", "answers"]
-    return {
-        "cells": table(tried),
-        "by setting": tried.groupby(["setting", "whole"], sort=False).size(),
-        "nearest": tried[columns].head(5),
-    }
+    counts = tried.groupby(["setting", "whole"], sort=False).size()
+    return {"cells": table(tried), "by setting": counts, "nearest": tried.head(5)}
 
 
 def runs_made_again() -> Any:
     asked = [("true slope", "none"), ("theta held", "none"), ("nudged", "none")]
     asked += [("true slope", "nudged"), ("theta held", "nudged")]
-    return {
-        f"{part}: {arm}, {than}": interventions.live(runs, arm, than)
-        for part, runs in again().groupby("part", sort=False)
-        for arm, than in asked
-    }
-
-
-def by_field(row: Any) -> dict[str, Any]:
-    """The fields of a `RemedyRow` by name."""
-    return {name: getattr(row, name) for name in remedies.RemedyRow._fields}
+    parts = again().groupby("part", sort=False)
+    return {f"{part}: {arm}, {than}": interventions.live(runs, arm, than)
+            for part, runs in parts for arm, than in asked}  # fmt: skip
 
 
 def advice() -> Any:
-    by_entry = remedies.advice(suite()).groupby("entry", sort=False)
-    return {
-        f"{i:02} {entry}": {
-            "entry": entry,
-            "word": each.word.iloc[0],
-            "tuning": each.tuning.iloc[0],
-            "rows": {one.part: by_field(one) for one in each.itertuples()},
-        }
-        for i, (entry, each) in enumerate(by_entry, start=1)
-    }
-
-
-def what_was_expected() -> Any:
     advised = remedies.advice(suite())
-    return remedies.expectations(advised) | {"greatest": remedies.greatest(advised)}
-
-
-def shares_in_named_layouts() -> Any:
-    there = suite()[suite().part.str.startswith("named")]
-    groups = there.groupby(["part", "entry"], sort=False)
-    return {plain_name(name): remedies.shares(runs) for name, runs in groups}
+    expected = remedies.expectations(advised) | {"greatest": remedies.greatest(advised)}
+    return {"expected": expected, "order": [*advised.entry.unique()],
+            "rows": advised.set_index(["entry", "part"])}  # fmt: skip
 
 
 def courses() -> Any:
-    found = {}
     asked = [("judge", ()), ("one", ()), ("all", ()), ("all", [*TUNE]), ("all", [*JUDGE])]
+    found = {}
     for (part, among), agent in product(asked, agents.AGENTS):
         one = agents.course(trained(), part, agent, among)
-        if len(one.last):
-            found[f"{agent}, {part}, {len(one.last)}"] = {
-                "episodes": one.episodes,
-                "median": one.median,
-                "interval": one.interval,
-                "matched": one.matched,
-                "shares": array(one.shares.to_numpy()),
-                "there": one.there.mean(axis=1).to_numpy(),
-            }
+        found[f"{agent}, {part}, {len(one.last)}"] = {
+            "shares": table(one.shares), "there": table(one.there), "numbers": one.numbers,
+            "median": one.median, "interval": one.interval,
+        }  # fmt: skip
     return found
 
 
-def of_worlds(of: Callable[[pd.DataFrame], Any]) -> dict[str, Any]:
-    """What comes of the means of each column in each part of the worlds that change."""
-    columns = ("cost", "inside", "arrived")
-    return {
-        f"{part}, {column}": of(worlds.means(changing(), part, column))
-        for part, column in product(worlds.PARTS, columns)
-    }
-
-
-def saved_with_a_wrong_model() -> Any:
-    found = world_report.saved(changing()).groupby(level=0, sort=False)
-    return {fault: each.median().dropna().to_dict() for fault, each in found}
-
-
-def rows_among_moving_obstacles() -> Any:
-    found = world_report.moving(changing()).rename(columns={"saved": "gain"})
-    return {plain_name(name): row[["clear", "gain", "solved"]].to_dict()
-            for name, row in found.iterrows()}  # fmt: skip
+def means_in_worlds() -> Any:
+    """The mean of each arm in each part, and its median over places."""
+    found = {}
+    for part, column in product(worlds.PARTS, ("cost", "inside", "arrived")):
+        means = worlds.means(changing(), part, column)
+        found[f"{part}, {column}"] = {"all": table(means), "median": means.median()}
+    return found
 
 
 def costs() -> Any:
-    return {
-        arm: {
-            "middle": interquartile_mean(tests, ["all"] * len(tests)),
-            "median": float(np.median(tests)),
-            "ended": int(np.isfinite(tests).sum()),
-            "tests": array(tests),
-        }
-        for arm, tests in problems().tests.items()
-    }
-
-
-def predictions() -> Any:
-    answers = other_problems.OTHER_PROBLEMS.answers(other_problems.OTHER_PROBLEMS.table())
-    return {name: one.outcome == REPRODUCED for name, one in answers.items()}
-
-
-def references() -> Any:
-    rows = other_problems.OTHER_PROBLEMS.table().query("part == 'references'").set_index("arm")
-    return {**problems().references, "theta": rows.theta["best_theta"]}
-
-
-def spread_of_solvers() -> Any:
-    runs = problems().spreads
-    frame = runs[["before", "nudged", "after"]].copy()
-    for solver in other_problems.PEERS:
-        frame[solver] = runs[solver]
-        frame[f"{solver}, steps"] = runs[f"steps of {solver}"]
-    gaps = np.array([*runs.gap])
-    return {"median": frame.median(), "mean": frame.mean(), "gap": np.median(gaps, axis=0)}
+    return {arm: [interquartile_mean(tests, ["all"] * len(tests)), table(tests)]
+            for arm, tests in problems().tests.items()}  # fmt: skip
 
 
 # What names a run: no edit may change a key, or stored runs would be trained again.
 
 
-@cache
-def keys_of_runs() -> dict[Any, tuple[str, str]]:
-    """Keys of each run of the study and of its summary, with what made the first of them."""
-    first = study().batches[0]
+def keys() -> Any:
+    """Keys of all runs of the study and of their summaries, with what made the first of them."""
+    first, rows, parts = study().batches[0], study().rows, design.whole_study()
     with (
         mock.patch.object(provenance, "installed", first["versions"].__getitem__),
         mock.patch.object(provenance, "EPOCHS", first["epochs"]),
     ):
-        return {e: (provenance.key(e), provenance.summary_key(e)) for e in design.whole_study()}
-
-
-def keys() -> Any:
-    parts, wanted = design.whole_study(), dict.fromkeys(reproduce.sample(study().variants, 60))
-    first = {part: e for e, part in reversed(parts.items())}
-    some = (
-        design.main_table(layouts=["A"], seeds=[0, 1, 2]),
-        design.main_table(layouts=["B", "E"], decays=["step"], seeds=[0]),
-        design.main_table(layouts=["C", "D", "F"], decays=["episode"], seeds=[0]),
-    )
-    wanted |= dict.fromkeys([*chain.from_iterable(some), *first.values()])
-    known = keys_of_runs()
+        known = {e: (provenance.key(e), provenance.summary_key(e)) for e in parts}
     return {
-        f"{parts[e]}: {e.learner} {e.layout} {e.decay} {e.seed}": [one[:16] for one in known[e]]
-        for e in wanted
-    }
-
-
-def all_keys() -> Any:
-    known, rows = keys_of_runs(), study().rows
-    return {
-        "runs": len(known),
+        "first of each part": {part: known[e] for e, part in reversed(parts.items())},
         "as published": sum(rows[e]["key"] == one for e, (_, one) in known.items() if e in rows),
-        "all, in their order": short([*known.values()]),
+        "all, in their order": [len(known), short([*known.values()])],
     }
 
 
 def seeds() -> Any:
-    named = (*LAYOUTS, *paper.LAYOUTS)
-    where = {part: [*one.places] for part, one in worlds.PARTS.items()}
+    places = {part: [*one.places] for part, one in worlds.PARTS.items()}
     return {
-        "remedies": short([seed_of(place, 0) for place in named]),
+        "remedies": short([seed_of(place, 0) for place in (*LAYOUTS, *paper.LAYOUTS)]),
         "agents": [agents.seed_of(place, 1) for place in (agents.EVERY, "A", "J001")],
-        "worlds": {part: short([worlds.WORLDS.seed(place, 1) for place in places])
-                   for part, places in where.items()},
+        "worlds": {part: short([worlds.WORLDS.seed(place, 1) for place in some])
+                   for part, some in places.items()},
     }  # fmt: skip
 
 
 FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by name
     "verdicts": {
-        "as published": lambda: by_claim(study().verdicts),
+        "as published": verdicts,
         "thresholds and rule": lambda: {
             "numbers": prespecified.NUMBERS, "fixed": prespecified.fixed(study().about),
         },
@@ -412,7 +242,9 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
         "distances of policies": lambda: table(
             paper_claims.policy_distances(every().main.runs, six_paths())
         ),
-        "constraints without noise": constraints_without_noise,
+        "constraints without noise": lambda: paper_claims.kept_without_noise(
+            every().main.runs, PAPER
+        ).groupby(level="learner", sort=False).agg(["sum", "size"]),
         "costs less than GES": costs_less_than_ges,
     },
     "study": {
@@ -423,59 +255,59 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
         "failure modes": lambda: study().runs.groupby(
             ["variant", "learner", "wrong", "mechanism", "ending"], sort=False
         ).size(),
-        "runs that went wrong": runs_that_went_wrong,
         "answers of thresholds": answers_of_thresholds,
         "the finding": lambda: plain(finding.finding(study()), ROLLOUT),
         "middle of each learner": middle_of_each_learner,
-        "share of the possible": share_of_the_possible,
-        "searches": searches,
-        "ratios of times": ratios_of_times,
+        "shares of the possible": shares_of_the_possible,
+        "searches": lambda: {
+            f"{one.layout} {one.seed} {one.budget}": {
+                "after 200": found.after(200), "made": found.made, "theta": found.theta,
+            }
+            for one, found in study().searches.items()
+        },
+        "ratios of times": lambda: {
+            f"{learner}, {solver}": ratio(study().timings, solver, learner)
+            for solver, learner in study().timings[["solver", "learner"]].to_numpy()
+        },
     },
     "population": {
         "shares": lambda: drawn().shares.set_index("claim"),
         "shares in A to F": shares_in_a_to_f,
         "where each claim holds": lambda: table(population.by_layout(drawn().main, drawn().paths)),
-        "verdicts that stand": verdicts_that_stand,
         "answers": answers,
-        "other answers": other_answers,
-        "the raised costs": lambda: plain(raised(), RAISED),
+        "the cliff": lambda: plain(population.cliff(population.raised()), RAISED),
+        "early overshoot in A to F": lambda: population.early_overshoot(study().main.runs),
+        "extrapolation": lambda: interventions.INTERVENTIONS.judge(again()),
+        "the raised costs": lambda: plain(population.raised(), RAISED),
         "predictors": predictors,
-        "successes": successes,
         "at the gap": at_the_gap,
         "whole picture tried": whole_picture_tried,
         "runs made again": runs_made_again,
     },
     "remedies": {
-        "answers on remedies": lambda: by_question(remedies.REMEDIES.answers(suite()).values()),
+        "answers on remedies": lambda: remedies.REMEDIES.answers(suite()),
         "advice": advice,
-        "what was expected": what_was_expected,
-        "rows": lambda: {
-            part: {one.entry: by_field(one) for one in remedies.rows(suite()[suite().part == part])}
-            for part in [*remedies.PARTS][1:]
+        "rows": lambda: remedies.rows(suite()[suite().part != "best"]),
+        "shares": lambda: {
+            plain_name(name): table(remedies.shares(runs))
+            for name, runs in suite().groupby(["part", "entry"], sort=False)
         },
-        "shares in named layouts": shares_in_named_layouts,
         "best settings": lambda: {
             entry: remedies.best_setting(runs)
             for entry, runs in suite()[suite().part == "tune"].groupby("entry", sort=False)
         },
     },
     "agents": {
-        "answers on agents": lambda: by_question(
-            agents.SAC_AND_TD3.judge((trained(), suite())).values()
-        ),
-        "answers without the suite": lambda: {
-            name: one.outcome
-            for name, one in agents.SAC_AND_TD3.judge((trained(), suite()[:0])).items()
-        },
+        "answers on agents": lambda: agents.SAC_AND_TD3.judge((trained(), suite())),
+        "answers without the suite": lambda: agents.SAC_AND_TD3.judge((trained(), suite()[:0])),
         "costs of the best search": lambda: {
             part: agents.searched(suite(), part) for part in agents.SEARCHED
         },
         "courses": courses,
     },
     "worlds": {
-        "answers on worlds": lambda: by_question(worlds.WORLDS.answers(changing()).values()),
-        "medians": lambda: of_worlds(lambda means: means.median()),
-        "means": lambda: of_worlds(table),
+        "answers on worlds": lambda: worlds.WORLDS.answers(changing()),
+        "means": means_in_worlds,
         "shares after a change": lambda: {
             part: worlds.shares(changing(), part).median() for part in worlds.CHANGES
         },
@@ -483,20 +315,25 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
             arm: table(worlds.carried(changing(), arm)) for arm in ("ES", "CMA-ES")
         },
         "solved with a terminal cost": lambda: worlds.solved_with(changing()).sum(),
-        "saved with a wrong model": saved_with_a_wrong_model,
-        "rows among moving obstacles": rows_among_moving_obstacles,
-        "drawn scenarios": lambda: {"count": len(SCENARIOS), "all": short(plain(SCENARIOS))},
+        "saved with a wrong model": lambda: world_report.saved(changing()).groupby(
+            level=0, sort=False
+        ).median(),
+        "rows among moving obstacles": lambda: world_report.moving(changing()),
+        "drawn scenarios": lambda: short(plain(SCENARIOS)),
     },
     "problems": {
         "costs": costs,
-        "predictions": predictions,
-        "references": references,
-        "spread of solvers": spread_of_solvers,
+        "predictions": lambda: other_problems.OTHER_PROBLEMS.answers(
+            other_problems.OTHER_PROBLEMS.table()
+        ),
+        "references": lambda: problems().references,
+        "medians": lambda: problems().medians,
+        "spread of solvers": lambda: table(problems().spreads.drop(columns="seconds")),
         "sweep of drawn problems": lambda: json.loads(
             (published.folder() / "sweep.json").read_text()
         )["tally"],
     },
-    "keys": {"keys": keys, "all keys": all_keys, "seeds": seeds},
+    "keys": {"keys": keys, "seeds": seeds},
     "machine": {"abilities": processor},
 }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Values of the library as plain JSON: floats to the last digit, tables and arrays as hashes."""
+"""Values of the library as plain JSON: floats to the last digit, long tables as hashes."""
 
 import hashlib
 import json
@@ -20,7 +20,7 @@ def plain(value: Any, digits: int | None = None) -> Any:
     """A value as JSON can hold it; of a dataclass the fields that are no sentences.
 
     Args:
-        value: a number, a table, a dataclass, or any nesting of these.
+        value: a number, a table, a tuple with names, a dataclass, or any nesting of these.
         digits: to how many significant digits floats are rounded; all of them by default.
     """
     if isinstance(value, Enum):
@@ -39,6 +39,8 @@ def plain(value: Any, digits: int | None = None) -> Any:
     if is_dataclass(value):
         names = [one.name for one in fields(value) if one.name not in SENTENCES]
         return {name: plain(getattr(value, name), digits) for name in names}
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict(), digits)
     if isinstance(value, pd.DataFrame):
         return {plain_name(name): plain(row, digits) for name, row in value.iterrows()}
     if isinstance(value, Mapping | pd.Series):
@@ -51,18 +53,15 @@ def plain_name(name: Any) -> str:
     return " ".join(map(str, name)) if isinstance(name, tuple) else str(name)
 
 
-def table(frame: pd.DataFrame) -> dict[str, Any]:
+def table(frame: pd.DataFrame | pd.Series) -> dict[str, Any]:
     """The number of rows and a hash of each column: every cell, in the order of the rows."""
     return {
         "rows": len(frame),
-        "columns": {str(name): short([_cell(one) for one in frame[name]]) for name in frame},
+        "columns": {
+            str(name): short([_cell(one) for one in column])
+            for name, column in pd.DataFrame(frame).items()
+        },
     }
-
-
-def array(values: Any) -> str:
-    """A hash of the bytes of an array, with its shape and type."""
-    known = np.ascontiguousarray(values)
-    return short([known.dtype.str, known.shape, hashlib.sha256(known.tobytes()).hexdigest()])
 
 
 def short(value: Any) -> str:
