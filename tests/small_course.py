@@ -1,4 +1,4 @@
-"""A chapter that takes no time to run: exercises that all ask for a root."""
+"""Exercises, and a chapter that takes no time to run: four of them, which ask for a root."""
 
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
@@ -7,12 +7,22 @@ CHECKS = """from types import SimpleNamespace
 from nmpcrl.course import number
 root = lambda a: number(a, 2, mistakes={4.0: "Take the root."})
 check = SimpleNamespace(one=root, two=root, three=root, four=root)"""
-HEAD = (
-    '<a id="ex-{1}"></a>\n**Exercise 1.{0}.** *1 minute, {0} points.* '
-    "What is the root of the number `four`?"
-)
-ANSWER = "root_of_{0} = ...\n### BEGIN SOLUTION\nroot_of_{0} = 2\n### END SOLUTION"
-SOLUTION = "<details><summary>Solution</summary>\n\nIt is 2.\n\n</details>"
+
+
+def exercise(name, number="1.1", *, points=1, given="x = ...", solution="x = 2", check=None):
+    """The cells of an exercise."""
+    head = f'<a id="ex-{name}"></a>\n**Exercise {number}.** *5 minutes, {points} point'
+    sources = {
+        "exercise": f"{head}{'s' * (points > 1)}.* How?",
+        "answer": f"{given}\n### BEGIN SOLUTION\n{solution}\n### END SOLUTION",
+        "check": check or f"check.{name}({given.split()[0]})",
+        "solution": "<details><summary>Solution</summary>\n\nThus.\n\n</details>",
+    }
+    code = {"answer": new_code_cell, "check": new_code_cell}
+    return [
+        code.get(tag, new_markdown_cell)(source, id=f"{name}-{tag}", metadata={"tags": [tag]})
+        for tag, source in sources.items()
+    ]
 
 
 def small_chapter():
@@ -22,19 +32,10 @@ def small_chapter():
         new_code_cell("four = 4.0", id="chapter"),
         new_code_cell(CHECKS, id="exercises-checks"),
     ]
-    for number, name in enumerate(ASKED, start=1):
-        cells += [
-            tagged("exercise", new_markdown_cell(HEAD.format(number, name), id=f"{name}-text")),
-            tagged("answer", new_code_cell(ANSWER.format(name), id=f"{name}-answer")),
-            tagged("check", new_code_cell(f"check.{name}(root_of_{name})", id=f"{name}-check")),
-            tagged("solution", new_markdown_cell(SOLUTION, id=f"{name}-solution")),
-        ]
+    for k, name in enumerate(ASKED, start=1):
+        given, solution = (f"root_of_{name} = {one}" for one in ("...", "2"))
+        cells += exercise(name, f"1.{k}", points=k, given=given, solution=solution)
     return new_notebook(cells=cells)
-
-
-def tagged(tag, cell):
-    cell.metadata["tags"] = [tag]
-    return cell
 
 
 def cell_of(notebook, name):

@@ -19,6 +19,7 @@ from driver import project
 from driver.build import book, chapters, execute, train
 from filelock import FileLock
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from small_course import exercise
 
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 
@@ -134,6 +135,12 @@ def run(place: Path, *arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
+def far(solution: str) -> list:
+    """Exercise 1.1 of the book, with a solution."""
+    check = "from nmpcrl.course.checks import mdp_and_nmpc as check\n\ncheck.distance(d)"
+    return exercise("far", given="d = ...", solution=solution, check=check)
+
+
 EXECUTION = "print(open('executions', 'a').write('{}'))"  # leaves this letter
 WHERE = "import ipykernel\nprint(ipykernel.get_connection_info())"
 SETTINGS = f"import os\nprint(*[os.environ[name] for name in {CHOSEN}])"
@@ -150,7 +157,7 @@ def whole(shared, robot_module) -> Path:
         if not place.exists():
             small_book(place)
             last = map(new_code_cell, (EXECUTION.format("x"), WHERE, SETTINGS, "print(episodes)"))
-            save(place, *exercise("d = 1.375"), *last)
+            save(place, *far("d = 1.375"), *last)
             result = run(place)
             assert result.returncode == 0, result.stderr
             (place / "said").write_text(result.stdout)
@@ -250,7 +257,7 @@ def test_cells_and_solutions_that_fail_are_named_and_no_older_book_survives(smal
     (small / "_build/html").mkdir(parents=True)
     listed(small, "one", "two")
     save(small, new_code_cell("1 / 0"))
-    save(small, *exercise("d = 1.25"), name="two")
+    save(small, *far("d = 1.25"), name="two")
     result = run(small)
     assert result.returncode == 1
     assert "one: cell 3 failed with ZeroDivisionError: division by zero" in result.stderr
@@ -277,22 +284,6 @@ def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
         project.Failure, match=r"ones:\nC3 is reproduced \[0.50, 0.60\] here, and not"
     ):
         train.measure((lambda: SimpleNamespace(timings=CONTRADICTION),))
-
-
-def exercise(code: str) -> list:
-    """Exercise 1.1, whose solution is `code`."""
-    check = "from nmpcrl.course.checks import mdp_and_nmpc as check\n\ncheck.distance(d)"
-    cells = {
-        "exercise": '<a id="ex-far"></a>\n**Exercise 1.1.** *5 minutes, 1 point.* How far?',
-        "answer": f"d = ...\n### BEGIN SOLUTION\n{code}\n### END SOLUTION",
-        "check": check,
-        "solution": "<details><summary>Solution</summary>\n\nThus.\n\n</details>",
-    }
-    new = {"answer": new_code_cell, "check": new_code_cell}
-    return [
-        new.get(tag, new_markdown_cell)(source, metadata={"tags": [tag]})
-        for tag, source in cells.items()
-    ]
 
 
 @pytest.mark.slow

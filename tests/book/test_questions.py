@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from driver.page import questions
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat.v4 import new_notebook, new_output
+from small_course import exercise
 
 from nmpcrl.course import choice, number
 
@@ -30,26 +31,10 @@ AROUND = """<div class="exercise">How?</div>
 {place}<details class="folded"><summary>Solution</summary><p>So.</p></details>"""
 
 
-def executed(answer: str = "x = ...", outputs=()):
-    """A notebook with one exercise, run."""
-    cells = {
-        "exercise": '<a id="ex-a"></a>\n**Exercise 1.1.** *1 minute, 1 point.* How?',
-        "answer": f"{answer}\n### BEGIN SOLUTION\nx = 2\n### END SOLUTION",
-        "check": "check.a(x)",
-        "solution": "<details><summary>Solution</summary>\n\nThus.\n\n</details>",
-    }
-    made = [
-        (new_code_cell if tag in ("answer", "check") else new_markdown_cell)(
-            source, metadata={"tags": [tag]}
-        )
-        for tag, source in cells.items()
-    ]
-    made[2].outputs = [new_output("execute_result", one, metadata={}) for one in outputs]
-    return new_notebook(cells=made)
-
-
 def test_an_answer_that_can_be_typed_gets_a_place_above_its_folded_code():
-    page = questions.placed(executed(outputs=[RIGHT["weight"]._repr_mimebundle_()]))
+    cells, shown = exercise("a"), RIGHT["weight"]._repr_mimebundle_()
+    cells[2].outputs = [new_output("execute_result", shown, metadata={})]
+    page = questions.placed(new_notebook(cells=cells))
     _, place, code, solution = page.cells
     assert code.source == "x = ...\n\ncheck.a(x)"
     assert "hide-input" in code.metadata["tags"]

@@ -101,7 +101,6 @@ class Visit:
 
     requests: list[str] = field(default_factory=list)  # addresses
     errors: list[str] = field(default_factory=list)  # as the console has them
-    figures: list[str] = field(default_factory=list)  # live ones that show results
     formulas: int = 0  # that the page holds
     typeset: int = 0  # of them, by MathJax
     broken: list[str] = field(default_factory=list)  # those that MathJax could not read
@@ -157,9 +156,6 @@ def look_at(browser: Any, path: Path, views: Views) -> Visit:
 def judge(tab: Any, seen: Visit, views: Views) -> None:
     """Let axe look at a page in some widths and themes, its live figures begun."""
     tab.wait_for_function(BEGUN)
-    seen.figures = tab.locator("figure.live:has(.results)").evaluate_all(
-        "all => all.map(one => one.dataset.figure)"
-    )
     tab.evaluate(THIN)
     tab.evaluate(Axe().axe_script)
     for (width, theme), rules in views.items():
