@@ -10,13 +10,13 @@ from nmpcrl.control import Hard, Obstacle, Parameter, Plant, Problem, Series, So
 BEHIND = {"lower": [-9, -9, -np.inf], "upper": [3, 3, np.inf]}  # the printed box: not the target's
 
 
-def plant(**changes: Any) -> Plant:
+def plant(kind: type[Plant] = Plant, **changes: Any) -> Plant:
     """Two states that are moved by one input alike."""
     fields = {
         "dynamics": lambda state, action: ca.vertcat(action, action),
         "state_names": ("x", "y"), "action_names": ("a",), "lower": [-1.0], "upper": [1.0],
     }  # fmt: skip
-    return Plant(**fields | changes)
+    return kind(**fields | changes)
 
 
 def task(**changes: Any) -> Task:
@@ -44,7 +44,7 @@ def open_field(box: float = 1e3, **changes: Any) -> Task:
     return Task([0.0] * 4, target, [-box] * 4, [box] * 4, weights=[1.0] * 4, **changes)
 
 
-def pendulum(**changes: Any) -> Problem:
+def pendulum(kind: type[Problem] = Problem, **changes: Any) -> Problem:
     """A curved plant with everything that a problem may have; each symbol is learned."""
     fields = {
         "states": 2, "inputs": 1, "horizon": 6, "gamma": 0.95, "lower": -1.5, "upper": 1.5,
@@ -68,20 +68,21 @@ def pendulum(**changes: Any) -> Problem:
         ],
         "data": {"wind": 0.0, "target": np.zeros(2)},
     }  # fmt: skip
-    return Problem(**fields | changes)
+    return kind(**fields | changes)
 
 
-def limited() -> Problem:
+def limited(**changes: Any) -> Problem:
     """The pendulum with hard rows of states, of both, and at the end, and a box of its states."""
-    return pendulum(
-        soft=[Soft(lambda x, u, th, d: x[0] - th["limit"][1], weight=1.0)],
-        hard=[
+    fields = {
+        "soft": [Soft(lambda x, u, th, d: x[0] - th["limit"][1], weight=1.0)],
+        "hard": [
             Hard(lambda x, u, th, d: x[1] - th["limit"][0], stages=slice(1, None)),
             Hard(lambda x, u, th, d: 0.5 * x[1] + u - th["limit"][1]),
             Hard(lambda x, u, th, d: x[0] ** 2 - 0.5 * th["limit"][1], stages=-1),
         ],
-        state_lower=[-2.0, -0.6],
-    )
+        "state_lower": [-2.0, -0.6],
+    }
+    return pendulum(**fields | changes)
 
 
 def tank(unit: float, row: float = 1.0, cost: float = 1.0, **changes: Any) -> Problem:

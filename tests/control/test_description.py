@@ -9,9 +9,9 @@ import casadi as ca
 import cloudpickle
 import numpy as np
 import pytest
-from small_problems import tank
+from small_problems import limited, plant, tank
 
-from nmpcrl.control import Fatrop, Hard, Ipopt, Nmpc, Plant, Problem, Riccati, Series, Soft, Task
+from nmpcrl.control import Fatrop, Hard, Ipopt, Nmpc, Plant, Problem, Riccati, Soft, Task
 from nmpcrl.control.content import NoContent
 from nmpcrl.control.solvers import stages
 from nmpcrl.study import paper
@@ -23,31 +23,9 @@ sys.stdout.buffer.write(pickle.dumps((nmpc.key, nmpc.solve(state, theta))))
 """
 
 
-def cart(gain=1.0, kind=Problem, **changes) -> Problem:
-    """A problem of lambdas, with everything that one may have."""
-    fields = {
-        "states": 2, "inputs": 1, "horizon": 4, "gamma": 0.9, "lower": -1.0, "upper": 1.0,
-        "theta": {"A": np.array([[1.0, 0.2], [0.0, 1.0]]), "limit": 0.5},
-        "model": lambda x, u, th, d: th["A"] @ x + gain * ca.vertcat(0, ca.sin(u)) + d["wind"],
-        "stage": lambda x, u, th, d: ca.sumsqr(x) / 3 + 0.1 * ca.sumsqr(u),
-        "terminal": lambda x, th, d: 2 * ca.sumsqr(x),
-        "initial": lambda x, th, d: th["limit"] ** 2 * x[0],
-        "soft": [Soft(lambda x, u, th, d: x[1] - th["limit"], weight=3.0)],
-        "hard": Hard(lambda x, u, th, d: x[0] + u - 3.0),
-        "state_upper": [np.inf, 2.0],
-        "data": {"wind": Series(np.linspace(0, 0.1, 5))},
-    }  # fmt: skip
-    return kind(**fields | changes)
-
-
-def pendulum(kind=Plant, **changes) -> tuple[Plant, Task]:
-    """A plant of a lambda, with a task."""
-    fields = {
-        "dynamics": lambda s, a: [s[1], -ca.sin(s[0]) + a], "state_names": ("angle", "speed"),
-        "action_names": ("torque",), "lower": [-2.0], "upper": [2.0],
-    }  # fmt: skip
-    task = Task([1.0, 0.0], [0.0, 0.0], [-5, -5], [5, 5], weights=[1.0, 1.0])
-    return kind(**fields | changes), task
+THETA = {name: one if np.ndim(one) else float(one) for name, one in
+         limited().split(limited().theta).items()}  # fmt: skip
+TASK = Task([1.0, 0.0], [0.0, 0.0], [-5, -5], [5, 5], weights=[1.0, 1.0])
 
 
 class Rough(Riccati):
@@ -70,9 +48,9 @@ def rewritten(kind: type, method: str, gain: float) -> type:
 def controllers() -> list[tuple[Nmpc, np.ndarray, np.ndarray]]:
     """Of every kind, with a state and theta."""
     return [
-        (Nmpc(cart(), solver="ipopt"), np.array([0.7, 0.2]), cart().theta),
+        (Nmpc(limited(), solver="ipopt"), np.array([0.1, 0.0]), limited().theta),
         (Nmpc(tank(1e-6), solver=Fatrop(1e-9)), np.array([5e-7, 1e-6]), tank(1e-6).theta),
-        (Nmpc(*pendulum(), 4, solver="ipopt"), np.array([1.0, 0.3]), np.full(6, 0.5)),
+        (Nmpc(plant(), TASK, 4, solver="ipopt"), np.array([1.0, 0.3]), np.full(6, 0.5)),
         (paper.nmpc(), np.array(paper.START), np.array(paper.THETA_INIT)),
     ]
 
@@ -127,42 +105,40 @@ def test_a_copy_another_layout_horizon_or_discount_takes_no_other_machine_code()
 
 def test_a_key_says_what_a_user_wrote():
     """With all that his code reads, and not where it stands."""
-    one, again = (rewritten(Nmpc, "solve", 1)(cart()) for _ in range(2))
+    one, again = (rewritten(Nmpc, "solve", 1)(limited()) for _ in range(2))
     assert one.key == again.key == pickle.loads(cloudpickle.dumps(one)).key
     again.bias = 0.5
     assert again.key != one.key
-    plain = Nmpc(cart())
+    plain = Nmpc(limited())
     plain.solve = lambda *_: None
-    assert plain.key != Nmpc(cart()).key
+    assert plain.key != Nmpc(limited()).key
     plain.solve = np.random.default_rng(0)
     with pytest.raises(NoContent, match="a Generator"):
         _ = plain.key
 
 
 def test_a_key_is_that_of_the_content_and_any_other_number_or_name_is_another_key():
-    assert Nmpc(cart()).key == Nmpc(cart()).key
-    assert len(Nmpc(cart()).key) == 64
-    assert pendulum()[0].key == pendulum()[0].key
-    matrix = np.array([[1.0, 0.2], [0.0, 1.0]])
+    assert Nmpc(limited()).key == Nmpc(limited()).key
+    assert len(Nmpc(limited()).key) == 64
+    assert plant().key == plant().key
     changed = [
-        {}, {"gain": 1.0000000001}, {"gamma": 0.91}, {"lower": -0.99}, {"terminal": None},
-        {"data": {"wind": 0.0}},
-        {"theta": {"A": np.eye(2), "limit": 0.5}},
-        {"theta": {"A": matrix, "limit": 0.5000000001}},
-        {"state_upper": [np.inf, 2.1]}, {"hard": ()},
-        {"soft": [Soft(lambda x, u, th, d: x[1] - th["limit"], weight=3.1)]},
-        {"soft": [Soft(lambda x, u, th, d: x[1] - th["limit"], weight=3.0, stages=[2])]},
+        {}, {"gamma": 0.9500000001}, {"lower": -1.49}, {"terminal": None},
+        {"data": {"wind": 0.1, "target": np.zeros(2)}},
+        {"theta": THETA | {"Q": np.eye(2)}}, {"theta": THETA | {"r": 0.2000000001}},
+        {"state_lower": [-2.0, -0.61]}, {"hard": ()}, {"scale": [2.0, 1.0]},
+        {"soft": [Soft(lambda x, u, th, d: x[0] - th["limit"][1], weight=1.1)]},
+        {"soft": [Soft(lambda x, u, th, d: x[0] - th["limit"][1], weight=1.0, stages=[2])]},
         {"hard": Hard(lambda x, u, th, d: x[0] + u - 3.1)},
         {"stage": lambda x, u, th, d: ca.sumsqr(x) / 3 + 0.1 * ca.sumsqr(2 * u)},
         *({"kind": rewritten(Problem, "stage_data", gain)} for gain in (1, 2)),
     ]  # fmt: skip
     solvers = Fatrop(), Ipopt(), Riccati(1e-9), Riccati(starts=3), Rough(), Rough(starts=3)
-    others = [Nmpc(cart(**one)) for one in changed]
-    others += [Nmpc(cart(), solver=how) for how in solvers]
-    others += [Nmpc(cart(), ties_active=True), paper.nmpc(), paper.nmpc("B")]
+    others = [Nmpc(limited(**one)) for one in changed]
+    others += [Nmpc(limited(), solver=how) for how in solvers]
+    others += [Nmpc(limited(), ties_active=True), paper.nmpc(), paper.nmpc("B")]
     others += [paper.nmpc(horizon=9), paper.nmpc(box="soft")]
-    others += [Nmpc(*pendulum(), **how) for how in ({}, {"gamma": 0.9}, {"slack_weight": 9})]
-    others += [Nmpc(*pendulum(period=0.1))]
-    others += [rewritten(Nmpc, "solve", gain)(cart()) for gain in (1, 2)]
-    others += [Nmpc(*pendulum(rewritten(Plant, "step", gain))) for gain in (1, 2)]
+    others += [Nmpc(plant(), TASK, **how) for how in ({}, {"gamma": 0.9}, {"slack_weight": 9})]
+    others += [Nmpc(plant(period=0.1), TASK)]
+    others += [rewritten(Nmpc, "solve", gain)(limited()) for gain in (1, 2)]
+    others += [Nmpc(plant(rewritten(Plant, "step", gain)), TASK) for gain in (1, 2)]
     assert len({one.key for one in others}) == len(others)

@@ -3,54 +3,26 @@
 import casadi as ca
 import numpy as np
 import pytest
+from small_problems import limited
 from wasm_host import Controller, Module
 
-from nmpcrl.control import Hard, Nmpc, Problem, Series, Soft
+from nmpcrl.control import Nmpc, Problem, Series, Soft
 from nmpcrl.control.browser import texts
 from nmpcrl.control.codegen.browser import from_texts
 
-AROUND = [1500.0, -1000.0], [4500.0, 1000.0]  # where states are drawn
 
-
-def tank() -> Problem:
-    """A tank that is filled against a demand: data, lines of data, hard rows, and large units."""
-    demand = 1000 * np.sin(np.arange(9))[:, None]
-    return Problem(
-        states=2,
-        inputs=1,
-        horizon=8,
-        gamma=0.95,
-        theta={"gain": 1.0, "level": 3000.0, "price": np.array([1.0, 0.1]), "cap": 0.1},
-        model=lambda x, u, th, d: ca.vertcat(
-            x[0] + th["gain"] * x[1] - d["demand"][0], 0.8 * x[1] + 1e4 * ca.tanh(u[0])
-        ),
-        stage=lambda x, u, th, d: (
-            th["price"][0] * (x[0] / 1000 - th["level"] / 1000) ** 2
-            + th["price"][1] * (x[1] / 1000) ** 2
-            + u[0] ** 2
-        ),
-        terminal=lambda x, th, d: 5 * (x[0] / 1000 - th["level"] / 1000) ** 2,
-        initial=lambda x, th, d: th["cap"] * x[0] / 1000,
-        soft=[
-            Soft(lambda x, u, th, d: x[0] / 1000 - 4 + th["cap"], weight=20.0),
-            Soft(lambda x, u, th, d: d["walls"][0] - x[1] / 1000 + th["cap"], 9.0, each="walls"),
-        ],
-        hard=[
-            Hard(lambda x, u, th, d: u[0] - x[0] / 1000 - 1),
-            Hard(lambda x, u, th, d: 2.5 - x[0] / 1000, stages=8),
-        ],
-        state_upper=np.array([np.inf, 2500.0]),
-        lower=-2.0,
-        upper=2.0,
-        data={"demand": Series(demand), "walls": np.array([[-2.0], [-2.5]])},
-        scale=[1000.0, 500.0],
-    )
+def walled() -> Problem:
+    """The limited pendulum with a series and lines of data, in units of its own."""
+    wall = Soft(lambda x, u, th, d: d["walls"][0] - x[1] + th["limit"][0], 9.0, each="walls")
+    winds, walls = Series(0.05 * np.sin(np.arange(7))), np.array([[-1.0], [-0.8]])
+    data = {"wind": winds, "target": np.zeros(2), "walls": walls}
+    return limited(soft=wall, data=data, scale=[1000.0, 500.0])
 
 
 @pytest.mark.slow
 def test_values_gradients_and_slopes_are_those_of_the_machine_code():
     """Cold, warm and shifted; with u_0 free and given; and the model's step and cost."""
-    problem = tank()
+    problem = walled()
     data = from_texts(texts(problem))
     assert len(data) < 150_000
     nmpc = Nmpc(problem)
@@ -61,7 +33,7 @@ def test_values_gradients_and_slopes_are_those_of_the_machine_code():
     warm = kept = None
     for k in range(30):
         theta = problem.theta * rng.uniform(0.97, 1.03, problem.theta.size)
-        state, action = rng.uniform(*AROUND), rng.uniform(-1, 1, m) if k % 3 == 2 else None
+        state, action = rng.uniform(-0.8, 0.8, 2), rng.uniform(-1, 1, m) if k % 3 == 2 else None
         if k % 5 == 4:
             state = warm.states[1]
         ours = nmpc.solve(state, theta, warm if k % 2 else None, action)

@@ -4,25 +4,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from csnlp.wrappers import NlpSensitivity
+from differences import active
 
-from nmpcrl.control import Nmpc, Riccati, Solution
+from nmpcrl.control import Nmpc, Riccati
 from nmpcrl.study.problems import gros_zanon as gz
 from nmpcrl.study.problems import peers
 
 PROBLEM = gz.problem()
-CLEAR = 1e-4  # from a change of the active rows
-
-
-def strict(solution: Solution) -> bool:
-    """Whether every row and bound is clearly active or clearly not: no kink is near."""
-    m, ocp = solution.multipliers, solution.ocp
-    prices = np.outer(PROBLEM.gamma ** np.arange(len(ocp.states)), ocp.slack_weights)
-    shares = m.obstacles / prices
-    nearest = np.minimum(shares, 1 - shares)
-    doubtful = (nearest > 1e-7) & (nearest < CLEAR)
-    weak = (np.abs(m.inputs) > 1e-7) & (np.abs(m.inputs) < CLEAR)
-    between = (np.abs(np.abs(solution.inputs) - 1) < CLEAR) & (np.abs(m.inputs) < CLEAR)
-    return not (doubtful.any() or weak.any() or between.any())
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +40,7 @@ def test_values_and_their_gradients_are_csnlps(agent, kind):
         assert found.success
         solution = ours.solve(state, theta, action=action if kind == "Q" else None)
         assert solution.value == pytest.approx(float(found.f), rel=1e-6, abs=1e-6)
-        if strict(solution):
+        if active(solution):  # no kink is near
             flat = np.array(gradient_of(found.x, found.p, found.lam_g_and_h)).ravel()
             parts = np.split(flat, np.cumsum([one.size for one in names.values()])[:-1])
             by_columns = zip(parts, names.values(), strict=True)  # as csnlp has matrices
