@@ -153,7 +153,6 @@ TESTS = {  # of a file, where they are not in the file of its name
     "claims/paper_claims.py": "claims/test_claims.py",
     "claims/own_claims.py": "claims/test_claims.py",
     "claims/assumptions.py": "claims/test_claims.py",
-    "studies/difficulty.py": "studies/test_difficulty.py studies/test_predictors.py",
     "bench/paired.py": "bench/test_paired.py bench/test_learners.py",
 }
 

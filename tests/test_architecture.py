@@ -24,6 +24,12 @@ def test_control_and_learning_open_no_file():
         assert "codegen" in path.parts or not re.search(r"(?<![\w.])open\(", path.read_text()), path
 
 
+def test_no_array_is_unpickled():
+    for path in MODULES:
+        loads = re.findall(r"\bnp\.load\((.*)", path.read_text())
+        assert all("allow_pickle=False" in one for one in loads), path
+
+
 def cited(text: str) -> set[str]:
     """The letters in `# departure A`, `departures B and C`, `{ref}`departure-D``."""
     groups = re.findall(r"\bdepartures?[ -]([A-Z](?:(?:, | and )[A-Z])*)\b", text)

@@ -1,10 +1,11 @@
 """Each mechanism is found in the runs that have it, and in no others."""
 
-from dataclasses import asdict
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from builders import summary_of
 
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import thresholds
@@ -18,7 +19,6 @@ from nmpcrl.claims.failure_modes import (
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, paper
 
-EPISODES, EVERY, START_COST = 40, 10, 1000.0
 RISING = (1000.0, 990.0, 1200.0, 1200.0, 1200.0)  # at episodes 0, 10, 20, 30, 40
 WINDOW = slice(10, 20)  # in which that cost rose
 AMONG = slice(14, 15)  # an episode in it
@@ -31,28 +31,17 @@ CLOSING = (np.hypot(2.5, 1.7) / 2.5) ** 2 - 1  # theta_c at which 2 * 1.25 sqrt(
 OTHER = "none of these"
 BLAMED = OVER_PREDICTED * 30.0 / paper.GAMMA  # bias of a network beside the quiet TD error
 SIGNS = {"alpha_phi2": 3.0, "bias": 100.0, "theta_c": 0.9, "failed": 1}  # of each mechanism
-GOOD = (START_COST,) * 5
-QUIET = {"cost": 100.0, "steps": 130, "alpha_phi2": 0.4, "delta": 30.0, "iterations": 5.0}
-ZEROS = ["failed", "restarts", "outside", "inputs", "over", "loss", "bias", "error"]
-ZEROS += ["overlap", "seconds"]
 
 
-def made(learner="RDES", cost=RISING, states=THROUGH, stopped="finished", seed=0, **columns):
+def made(cost=RISING, **columns) -> RunSummary:
     """A quiet run but for the given columns, as pairs (where, value)."""
-    experiment = Experiment(learner, seed=seed, episodes=EPISODES, evaluate_every=EVERY)
-    quiet = QUIET | dict.fromkeys(ZEROS, 0.0)
-    episodes = {name: np.full(EPISODES, value) for name, value in quiet.items()}
-    episodes["theta"] = np.tile(paper.THETA_INIT, (EPISODES, 1))
-    episodes["w"] = np.full((EPISODES, 9), paper.W_INIT)
-    episodes["inside"] = np.zeros((EPISODES, 3), int)
+    run = summary_of(Experiment("RDES", episodes=40, evaluate_every=10), states=THROUGH)
+    judged = {name: column[: len(cost)] for name, column in run.evaluations.items()}
+    episodes = {name: column.astype(float) for name, column in run.episodes.items()}
     for name, (where, value) in columns.items():
         column = episodes["theta"][:, -1] if name == "theta_c" else episodes[name]
         column[where] = value
-    count, facts = len(cost), {"stopped": stopped, "seconds": 1.0}
-    evaluations = {"episode": EVERY * np.arange(count), "cost": np.array(cost)}
-    evaluations |= dict.fromkeys(("overlap", "distance"), np.zeros(count))
-    evaluations |= {"theta": episodes["theta"][:count], "inside": episodes["inside"][:count]}
-    return RunSummary(asdict(experiment), episodes, evaluations, states, np.zeros((5, 2)), facts)
+    return replace(run, episodes=episodes, evaluations=judged | {"cost": np.array(cost)})
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,6 @@ from nmpcrl.studies import (
     other_problems,
     population,
     remedies,
-    reproduce,
     worlds,
 )
 from nmpcrl.studies.difficulty import predictor_scores

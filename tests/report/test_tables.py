@@ -10,7 +10,7 @@ from bs4 import BeautifulSoup
 from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
-from nmpcrl.report import agents, remedies, tables, timing, worlds
+from nmpcrl.report import agents, remedies, tables, text, timing, worlds
 from nmpcrl.report.drawn import at_the_gap, improve_by_gap, share_table
 from nmpcrl.studies.agents import SAC_AND_TD3, course
 from nmpcrl.studies.difficulty import OPEN
@@ -19,6 +19,7 @@ from nmpcrl.studies.population import Drawn, shares
 from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, REMEDIES, RemedyRow
 from nmpcrl.studies.worlds import ORACLES, VIEWS
 from nmpcrl.study import paper
+from nmpcrl.study.design import VARIANTS
 from nmpcrl.study.drawn import JUDGE
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.moving import still
@@ -89,6 +90,45 @@ def test_runs_are_split_by_whether_theta_c_has_closed_a_gap_where_there_is_one(m
     each = len(runs[runs.learner == "ES"]) // 3
     counts = improve_by_gap(at_the_gap(Drawn(runs, {}, closes)))
     assert counts == {"open": (each, each), "closed": (0, each)}
+
+
+CHANGED = ["variant", "claim", "changes"]
+
+
+@pytest.mark.parametrize(
+    ("layouts", "decays", "disagreeing"),
+    [
+        ("yyyy", "yy", (False, False)),
+        ("yyny", "yy", (True, False)),
+        ("yypy", "yn", (True, True)),
+        ("yyoy", "yo", (False, False)),  # what is not decided contradicts nothing
+        ("oooo", "oo", (False, False)),
+    ],
+)
+def test_layouts_and_readings_disagree_where_two_decided_verdicts_differ(
+    layouts, decays, disagreeing
+):
+    read = {"y": REPRODUCED, "p": PARTLY, "n": NOT, "o": UNDECIDABLE}
+    by = [{name: read[one] for name, one in zip(names, of, strict=True)}
+          for names, of in (("ABCD", layouts), (("step", "episode"), decays))]  # fmt: skip
+    judged = [verdict(PARTLY, by_layout=by[0], by_decay=by[1]), verdict(NOT)]
+    depending = text.depends_on(judged, pd.DataFrame(columns=CHANGED))
+    assert ("B" in depending, "C" in depending) == disagreeing
+
+
+def test_a_departure_counts_every_variant_that_reads_it_otherwise():
+    assert (VARIANTS["tanh"].departure, VARIANTS["four fits"].departure) == ("H", "H")
+    assert VARIANTS["alpha x 3"].departure == ""
+    rows = [
+        ("tanh", "C6", True),
+        ("four fits", "C1", True),
+        ("four fits", "C6", True),
+        ("soft box", "C5", False),
+        ("alpha x 3", "C9", True),
+    ]  # the paper is clear about alpha
+    judged = [verdict(PARTLY, by_layout={"A": REPRODUCED, "B": NOT})]
+    found = text.depends_on(judged, pd.DataFrame(rows, columns=CHANGED))
+    assert found == {"B": ("C1",), "H": ("C1", "C6")}
 
 
 # Questions, methods and times
