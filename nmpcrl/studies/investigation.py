@@ -28,8 +28,8 @@ from nmpcrl.analysis.statistics import count
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.study import published
-from nmpcrl.study.files import folder
-from nmpcrl.study.jobs import parallel
+from nmpcrl.study.files import check_folder, folder, unwritable
+from nmpcrl.study.jobs import Failed, make_once
 from nmpcrl.study.lock import code, is_accepted, sources_hash
 from nmpcrl.study.provenance import EPOCHS, hash_of, installed, made_here, versions
 from nmpcrl.study.published import Unpublishable
@@ -187,14 +187,15 @@ class Investigation:
         """The file of the rows that were made here, a line of JSON each, with key and sources."""
         return folder() / f"{self.name}.jsonl"
 
-    def _lines(self) -> dict[str, tuple[Row, str]]:
-        """Rows by key, and the commit that had registered each when it was made.
+    def _lines(self, of: str = "") -> dict[str, tuple[Row, str]]:
+        """The row of a key, by default of each, and the commit that had registered it before.
 
         Incomplete lines are skipped, and rows of sources that are not accepted, or of other keys,
         arms, places or seeds.
         """
         found, order = {}, cache(lambda part, arm: {*self.parts[part].order(arm)})
-        for line in self.log.read_text("utf-8").splitlines() if self.log.exists() else ():
+        lines = self.log.read_text("utf-8").splitlines() if self.log.exists() else ()
+        for line in (one for one in lines if one.startswith(f'["{of}')):
             with suppress(ValueError):
                 key, sources, row, *commit = json.loads(line)
                 one = Condition(*(row[name] for name in NAMES))
@@ -230,20 +231,42 @@ class Investigation:
         return {one: it for one, it in self.conditions(part).items() if self.key(one) not in made}
 
     def complete(self, parts: Iterable[str] = (), workers: int | None = None) -> pd.DataFrame:
-        """Make every missing row of parts, by default of all; the table of rows made here."""
+        """Make every missing row of parts, by default of all; the table of rows made here.
+
+        One process at a time makes a row. `Failed` names a failure once all other rows are made.
+        """
         chosen = [*parts] or [*self.parts]
-        self.log.parent.mkdir(parents=True, exist_ok=True)
+        check_folder()
         for part in filter(chosen.__contains__, self.parts):
             missing = self.missing(part)
             if missing and self.prepare:
                 self.prepare(missing.items())
-            made = parallel(lambda job: self.make(*job), [*missing.items()], workers, part)
-            for (one, _), row in made:
-                named = one._asdict() | row
-                line = json.dumps([self.key(one), sources_hash(), named, self.registered])
-                with FileLock(f"{self.log}.lock"), self.log.open("a", encoding="utf-8") as file:
-                    file.write(f"\n{line}")  # begins a line, whatever was cut off before
+            _, failures = make_once(
+                lambda job: self.make(*job),
+                missing.items(),
+                name=lambda job: f"{self.name}-{self.key(job[0])[:16]}",
+                read=self._stored,
+                save=self._append,
+                workers=workers,
+                label=part,
+            )
+            if failures:
+                raise Failed(failures, len(missing))
         return self.made()
+
+    def _stored(self, job: tuple[Condition, Any]) -> Row | None:
+        """The row of a condition, if it was made here."""
+        return next((row for row, _ in self._lines(self.key(job[0])).values()), None)
+
+    def _append(self, job: tuple[Condition, Any], row: Row) -> None:
+        """Store a row."""
+        named = job[0]._asdict() | row
+        line = json.dumps([self.key(job[0]), sources_hash(), named, self.registered])
+        try:
+            with FileLock(f"{self.log}.lock"), self.log.open("a", encoding="utf-8") as file:
+                file.write(f"\n{line}")  # begins a line, whatever was cut off before
+        except OSError as error:
+            raise unwritable(self.log, error) from error
 
     def make(self, one: Condition, setting: Any) -> Row:
         """A row, with the seconds of processor time that it took unless it has its own."""

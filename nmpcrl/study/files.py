@@ -10,6 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
+from filelock import FileLock, Timeout
+
 from nmpcrl.study.refusal import Refusal
 
 
@@ -31,6 +33,26 @@ def check_folder() -> None:
             file.write(bytes(4096))
     except OSError as error:
         raise unwritable(place, error) from error
+
+
+def lock(name: str) -> FileLock:
+    """The lock of a value that is stored under a name; not acquired.
+
+    One process at a time makes a value. The system frees the lock of a process that ends.
+    """
+    place = folder() / ".locks"
+    place.mkdir(parents=True, exist_ok=True)
+    return FileLock(place / name, thread_local=False)
+
+
+def wait_for(name: str) -> Any:
+    """Acquire the lock of a value; say so where another process makes the value."""
+    one = lock(name)
+    try:
+        return one.acquire(timeout=0)
+    except Timeout:
+        say(f"another process is making {name}; waiting for it")
+        return one.acquire()
 
 
 def unwritable(path: Path, error: OSError) -> StoreError:

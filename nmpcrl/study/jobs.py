@@ -11,7 +11,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from itertools import islice
@@ -19,8 +19,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import psutil
+from filelock import FileLock, Timeout
 from tqdm import tqdm
 
+from nmpcrl.study.files import lock, wait_for
 from nmpcrl.study.refusal import ParameterError, Refusal
 
 ATTEMPTS = 3  # how often a job is begun whose process is killed
@@ -101,6 +103,61 @@ def parallel(
                 yield item, made
     if failures:
         raise Failed(failures, ended)
+
+
+def make_once(
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    name: Callable[[Item], str],
+    read: Callable[[Item], Result | None],
+    save: Callable[[Item, Result], object],
+    **how: Any,
+) -> tuple[dict[str, Result], list[Failure]]:
+    """Make the values that are not stored, each in one process at a time, and read the others.
+
+    Args:
+        function: makes the value of an item, as in `parallel`.
+        items: one a value, in the order in which jobs begin.
+        name: under which the value of an item is stored.
+        read: the stored value of an item, or None.
+        save: stores the value of an item.
+        how: further arguments of `parallel`.
+
+    Returns:
+        The values by name, and the failures of items without a value.
+    """
+    found, failures, left = dict[str, Result](), list[Failure](), {name(one): one for one in items}
+    locks = dict[str, FileLock]()
+
+    def is_free(item: Item) -> bool:
+        one = lock(name(item))
+        try:
+            one.acquire(timeout=0)
+        except Timeout:
+            return False
+        locks[name(item)], value = one, read(item)
+        if value is not None:
+            keep(item, value)
+        return value is None
+
+    def keep(item: Item, value: Result) -> None:
+        found[name(item)] = value
+        locks.pop(name(item)).release()
+
+    while left:
+        try:
+            for item, value in parallel(function, [*left.values()], ready=is_free, **how):
+                save(item, value)
+                keep(item, value)
+        except Failed as error:
+            failures += error.failures
+        finally:
+            for one in locks.values():
+                one.release()
+        left = {key: one for key, one in left.items() if key not in {*found, *locks}}
+        if left:  # other processes are making these
+            wait_for(next(iter(left))).lock.release()
+    return found, failures
 
 
 def _outcomes(

@@ -11,13 +11,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from filelock import FileLock, Timeout
-
 from nmpcrl.study import lock
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.files import StoreError, check_folder, folder, say, unwritable
+from nmpcrl.study.files import StoreError, check_folder, folder, say, unwritable, wait_for
 from nmpcrl.study.geometry import short_name
-from nmpcrl.study.jobs import Failed, Failure, parallel
+from nmpcrl.study.jobs import Failed, make_once
 from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import environment, key
@@ -94,7 +92,7 @@ class Store(Generic[Value]):
         value = self.read(named)
         if value is None:
             check_folder()
-            with self._wait_for(named):
+            with wait_for(self.path_of(named).stem):
                 value = self.read(named, report=True)
                 if value is None:
                     value = self.make(named, **options)
@@ -126,23 +124,17 @@ class Store(Generic[Value]):
         if missing:
             check_folder()
             compile_ahead(missing)
-        failures, label = list[Failure](), "runs" if progress else ""
-        while missing:
-            locks = dict[Named, FileLock]()
-            ready = partial(self._reserve, found, locks)
-            try:
-                for named, value in parallel(self.make, missing, workers, label, executor, ready):
-                    self.save(named, value)
-                    found[named] = value
-                    locks.pop(named).release()
-            except Failed as error:
-                failures += error.failures
-            finally:
-                for one in locks.values():
-                    one.release()
-            missing = [one for one in missing if one not in found and one not in locks]
-            if missing:  # other processes are making these
-                self._wait_for(missing[0]).lock.release()
+        made, failures = make_once(
+            self.make,
+            missing,
+            lambda one: self.path_of(one).stem,
+            partial(self.read, report=True),
+            self.save,
+            workers=workers,
+            label="runs" if progress else "",
+            executor=executor,
+        )
+        found |= {one: made[name] for one in missing if (name := self.path_of(one).stem) in made}
         if failures:
             failed = Failed(failures, len(wanted))
             if strict:
@@ -166,36 +158,6 @@ class Store(Generic[Value]):
             value.save(path)
         except OSError as error:
             raise unwritable(path, error) from error
-
-    def lock(self, named: Named) -> FileLock:
-        """The lock of a value; not acquired."""
-        locks = folder() / ".locks"
-        locks.mkdir(parents=True, exist_ok=True)
-        return FileLock(locks / self.path_of(named).stem, thread_local=False)
-
-    def _wait_for(self, named: Named) -> Any:
-        """Acquire the lock of a value."""
-        lock = self.lock(named)
-        try:
-            return lock.acquire(timeout=0)
-        except Timeout:
-            say(f"{named} is being trained by another process; waiting for it")
-            return lock.acquire()
-
-    def _reserve(self, found: dict[Any, Value], locks: dict[Named, FileLock], named: Named) -> bool:
-        """Lock a missing value; False if another process has the lock or has stored the value."""
-        lock = self.lock(named)
-        try:
-            lock.acquire(timeout=0)
-        except Timeout:
-            return False
-        value = self.read(named, report=True)
-        if value is None:
-            locks[named] = lock
-        else:
-            found[named] = value
-            lock.release()
-        return value is None
 
 
 def train(named: Named, **options: Any) -> Records:

@@ -1,6 +1,8 @@
 """An investigation makes each row once, loses none, and publishes what is complete."""
 
 import json
+import os
+import time
 from dataclasses import replace
 
 import pandas as pd
@@ -9,6 +11,7 @@ import pytest
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies.investigation import NAMES, Answer, Investigation, Part, Question, lower, means
 from nmpcrl.study import published
+from nmpcrl.study.files import folder
 from nmpcrl.study.provenance import EPOCHS
 from nmpcrl.study.published import Damaged, Unpublishable
 from nmpcrl.study.refusal import Refusal
@@ -64,6 +67,27 @@ def test_what_changes_a_number_changes_the_key_and_nothing_else_does():
     assert toy().key(one) == toy(questions=()).key(one)
     others = (toy(name="other"), toy(epoch=2), toy(parts=longer), toy(libraries=("cma",)))
     assert len({toy().key(one), *(each.key(one) for each in others)}) == 5
+
+
+def noted(setting, place, episodes, seed):
+    with (folder().parent / "made").open("a") as file:
+        file.write(f"{setting} {place} {seed}\n")
+    time.sleep(0.01)
+    return run(setting, place, episodes, seed)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+def test_two_processes_at_one_investigation_make_each_row_once():
+    one = toy(parts={"all": Part(noted, {"low": 1.0, "high": 2.0}, tuple("abcdefghij"), 10)})
+    other = os.fork()
+    table = one.complete(workers=1)
+    if not other:
+        os._exit(len(table) != 20)
+    assert os.waitpid(other, 0)[1] == 0
+    assert len(table) == len(one.made()) == 20
+    made = (folder().parent / "made").read_text().splitlines()
+    assert sorted(made) == sorted({*made})
+    assert len(made) == 20
 
 
 def of_other_sources(text):

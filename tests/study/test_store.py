@@ -155,7 +155,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_trained(
 def test_a_run_that_another_is_training_is_awaited_and_not_trained_twice(monkeypatch, ask):
     trained, said = list[Experiment](), list[str]()
     begun, waiting, go_on = (threading.Event() for _ in range(3))
-    monkeypatch.setattr(store, "say", lambda sentence: (said.append(sentence), waiting.set()))
+    monkeypatch.setattr(files, "say", lambda sentence: (said.append(sentence), waiting.set()))
 
     def slowly(experiment, **_):
         trained.append(experiment)
@@ -169,7 +169,7 @@ def test_a_run_that_another_is_training_is_awaited_and_not_trained_twice(monkeyp
         assert begun.wait(60)
         second = threads.submit(ask, QUICK)
         waiting.wait(60)
-        assert "being trained by another process" in "".join(said)
+        assert "another process is making" in "".join(said)
         go_on.set()
         assert_same_numbers(first.result(), second.result())
     assert trained == [QUICK]
