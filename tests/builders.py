@@ -1,7 +1,10 @@
 """What tests are about and nobody trained: records, summaries, rows, evidence, times, failures."""
 
+import json
+import re
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -58,6 +61,14 @@ def made_records(experiment: Experiment, rows: int, seed: int = 0) -> Records:
     facts = {"stopped": "diverged: “why”", "solver": "riccati", "seconds": 1.25}
     facts["final_cost"] = seed / 7 or np.inf
     return Records(asdict(experiment), drawn("steps", rows), drawn("evaluations", 3), facts)
+
+
+def own_investigation() -> str:
+    """The file of a reader's own investigation that Chapter 9 shows."""
+    page = Path(__file__).parents[1] / "book" / "09_your_own.ipynb"
+    texts = ("".join(cell["source"]) for cell in json.loads(page.read_text())["cells"])
+    (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
+    return str(block[0])
 
 
 def assert_same_numbers(one, other, but: frozenset[str] = frozenset()) -> None:

@@ -68,7 +68,7 @@ def investigate(
     _say(one, one.table() if judge or publish else made)
     registered = published.about(one.name, one.where).get("registered", "")
     if judge and one.source and one.registered != registered:
-        click.echo(f"not registered: the table is older than {name} as it is")
+        click.echo(f"not registered: the table is older than {name}; --publish makes it anew")
 
 
 def _load(name: str) -> "Investigation":

@@ -296,9 +296,12 @@ class Investigation:
         """Add the complete arms that were made here to the published table, or raise Unpublishable.
 
         Rows of earlier epochs are replaced part by part, once every arm of the part is complete.
+        A table whose every row was made again, with equal numbers, since a later commit registered
+        parts and questions, is registered by that commit.
         """
         there, made = self._published(), self.made()
-        blocks, replaced = list[pd.DataFrame](), set[str]()
+        known = published.about(self.name, self.where)
+        blocks, replaced, same = list[pd.DataFrame](), set[str](), dict[Any, pd.DataFrame]()
         for part, rows in made.groupby("part", sort=False) if len(made) else ():
             old, arms = there[there.part == part], self._complete(str(part), rows)
             if len(old) and not self.is_current(str(part)):
@@ -306,14 +309,23 @@ class Investigation:
                     continue
                 replaced.add(str(part))
             else:
-                same = [name for name in old if name != "seconds"]
+                names = [name for name in old if name != "seconds"]
                 for arm in filter(arms.__contains__, old.arm.unique()):
-                    known = old[old.arm == arm][same].reset_index(drop=True)
-                    if not known.equals(arms.pop(arm)[same]):
+                    before = old[old.arm == arm][names].reset_index(drop=True)
+                    same[part, arm] = again = arms.pop(arm)
+                    if not before.equals(again[names]):
                         raise Unpublishable(
-                            f"{arm} of the part {part!r} is published with other numbers"
+                            f"{arm} of the part {part!r} is published with other numbers, and these"
+                            " stay: give the investigation another name, or delete its table and"
+                            " manifest"
                         )
             blocks += arms.values()
+        registered = "" if self.unregistered else self.registered
+        old_arms = [*there[["part", "arm"]].drop_duplicates().itertuples(index=False, name=None)]
+        if registered and registered != known.get("registered") and {*old_arms} == {*same}:
+            blocks, replaced = [*map(same.__getitem__, old_arms), *blocks], {*there.part}
+        elif known:
+            registered = known.get("registered", "")
         if not blocks:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
         added, kept = pd.concat(blocks), self._with_lists(there)[~there.part.isin(replaced)]
@@ -328,10 +340,8 @@ class Investigation:
             table,
             arrays,
             batch=made_here() | {"epochs": {**self.epochs}, "rows": counts},
-            registered="" if self.unregistered else self.registered,
-            earlier=published.without(
-                published.about(self.name, self.where).get("batches", []), replaced
-            ),
+            registered=registered,
+            earlier=published.without(known.get("batches", []), replaced),
             where=self.where,
         )
 
@@ -386,7 +396,8 @@ def rounded(value: Any, digits: int | None) -> Any:
 def of_file(path: Path) -> Investigation:
     """The investigation that a Python file defines; published beside it, in `published`.
 
-    The commit of the file registers it. Rows are made again after an edit of its code.
+    The first commit with the present code of the file registers it; comments are no code. Rows are
+    made again after an edit of the code.
     """
     spec = spec_from_file_location(f"investigation_{path.stem}", path)
     if not path.is_file() or spec is None or spec.loader is None:
@@ -401,18 +412,25 @@ def of_file(path: Path) -> Investigation:
     if len(found) != 1:
         raise Refusal(f"{path} must define one Investigation, and defines {len(found)}")
     where = found[0].where or path.parent / "published"
-    registered, source = found[0].registered or _commit(path), code(path.read_text("utf-8"))
+    source = code(path.read_text("utf-8"))
+    registered = found[0].registered or _commit(path, source)
     return replace(found[0], where=where, registered=registered, source=source)
 
 
-def _commit(path: Path) -> str:
-    """The last commit of a file; empty if the file is not committed as it is."""
+def _commit(path: Path, source: str) -> str:
+    """The commit since which a file has its present code; empty if that is not committed."""
 
     def git(*arguments: str) -> str:
-        asked = ["git", "-C", str(path.parent), *arguments, "--", path.name]
-        return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
+        asked = ["git", "-C", str(path.parent), *arguments]
+        return subprocess.run(asked, capture_output=True, text=True, check=False).stdout
 
-    return "" if git("status", "--porcelain") else git("log", "-1", "--format=%H")
+    since = ""
+    with suppress(SyntaxError):
+        for commit in git("log", "--format=%H", "--", path.name).split():
+            if code(git("show", f"{commit}:./{path.name}")) != source:
+                break
+            since = commit
+    return since
 
 
 def share(

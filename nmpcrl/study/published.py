@@ -111,7 +111,7 @@ def write(
     arrays: Mapping[str, npt.NDArray[Any]] | None = None,
     *,
     batch: Batch,
-    registered: str = "",
+    registered: str | None = None,
     earlier: Iterable[Batch] | None = None,
     where: Path | None = None,
 ) -> Path:
@@ -122,7 +122,7 @@ def write(
         table: all rows, with those of earlier batches.
         arrays: all arrays.
         batch: `provenance.made_here()`, and counts of the new rows.
-        registered: the commit of questions and settings, if no row is published yet.
+        registered: the commit of questions and settings; by default that of the published rows.
         earlier: batches whose rows stay; by default all. A batch without counts is dropped where
             the others count every row.
         where: the folder, by default the project's.
@@ -145,7 +145,7 @@ def write(
             **old,
             "files": {file.name: sha256(file.read_bytes()).hexdigest() for file in files},
             "batches": batches,
-            "registered": old.get("registered", registered),
+            "registered": old.get("registered", "") if registered is None else registered,
         }
         entries = {**known, name: entry}
         write_json(place / MANIFEST, {**entries, SEAL: hash_of(entries)}, indent=1)

@@ -1,29 +1,23 @@
 """`nmpcrl investigate` with a reader's own file, and files that are none."""
 
-import json
-import re
 import subprocess
-from pathlib import Path
 
 import pytest
+from builders import own_investigation
 
 from nmpcrl.studies.investigation import of_file
 from nmpcrl.study import published
 from nmpcrl.study.refusal import Refusal
-
-PAGE = Path(__file__).parents[2] / "book" / "09_your_own.ipynb"
 
 pytestmark = pytest.mark.usefixtures("trains_here")
 
 
 @pytest.fixture
 def own(runs):
-    """The file that Chapter 9 shows, in a folder of its own."""
-    texts = ("".join(cell["source"]) for cell in json.loads(PAGE.read_text())["cells"])
-    (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
+    """The file in a folder of its own."""
     path = runs.parent / "mine" / "chain.py"
     path.parent.mkdir()
-    path.write_text(block[0])
+    path.write_text(own_investigation())
     return path
 
 
@@ -61,10 +55,22 @@ def test_a_committed_file_is_registered_by_its_commit(own, command):
     commit = published.about(of_file(own).name, own.parent / "published")["registered"]
     assert commit == git("rev-parse", "HEAD")
     assert "not registered" not in said + command("investigate", str(own), "--judge").stdout
-    own.write_text(own.read_text() + "\n# changed\n")
+    own.write_text(own.read_text() + "\n# a comment changes no number\n")
+    assert of_file(own).registered == commit
+    own.write_text(own.read_text().replace("Does the semi", "When does the semi"))
     assert of_file(own).registered == ""
     said = command("investigate", str(own), "--judge").stdout
     assert "not registered: the table is older than" in said
+    git("commit", "-qam", "Ask otherwise")
+    assert "published" in command("investigate", str(own), "--publish", "--workers", "1").stdout
+    entry = published.about(of_file(own).name, own.parent / "published")
+    assert entry["registered"] == git("rev-parse", "HEAD")
+    assert [one["rows"] for one in entry["batches"]] == [{"all": 60}]
+    assert "not registered" not in command("investigate", str(own), "--judge").stdout
+    own.write_text(own.read_text().replace("0.97, 0.05, 600", "0.97, 0.05, 601"))
+    git("commit", "-qam", "Change the numbers")
+    said = command("investigate", str(own), "--publish", "--workers", "1").stderr
+    assert "give the investigation another name" in said
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,114 @@
+"""An investigation and runs that are killed forty times end with the numbers of an undisturbed one.
+
+A child process completes a reader's investigation, that of Chapter 9 with longer rows, and some
+runs. The child, one of its workers or all of them are killed at drawn moments, and the child is
+started again. Nothing that is stored is lost or made again.
+"""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from builders import assert_same_numbers, own_investigation
+
+from nmpcrl.studies.investigation import of_file
+from nmpcrl.study import fetch_all, sweep
+from nmpcrl.study.store import RUNS
+
+KILLS, LATEST = 40, 9.0  # how often, and when at the latest [s]
+STUDY = sweep(learner=("ES", "frozen"), seed=range(6), episodes=10)
+PROGRAM = """
+import sys
+from pathlib import Path
+from nmpcrl.studies.investigation import of_file
+from nmpcrl.study import fetch_all, sweep
+fetch_all(sweep(learner=("ES", "frozen"), seed=range(6), episodes=10), workers=2, progress=False)
+of_file(Path(sys.argv[1])).complete(workers=2)
+"""
+
+
+@pytest.fixture
+def own(tmp_path) -> Path:
+    path = tmp_path / "chain.py"
+    text, found = re.subn(r"(GAMMA, ALPHA, UPDATES = .*), 600", r"\1, 20_000", own_investigation())
+    assert found
+    path.write_text(text)
+    return path
+
+
+def begun(own: Path, runs: Path) -> subprocess.Popen:
+    """The child, in a session of its own."""
+    environment = os.environ | {"NMPCRL_RUNS": str(runs), "PYTHONPATH": str(Path.cwd())}
+    asked = [sys.executable, "-c", PROGRAM, str(own)]
+    return subprocess.Popen(
+        asked, env=environment, start_new_session=True, stderr=subprocess.DEVNULL
+    )
+
+
+def stored(runs: Path) -> dict[str, object]:
+    """Complete rows by key, and the time at which each run was stored."""
+    log, found = runs / "chain.jsonl", {}
+    for line in log.read_text().splitlines() if log.exists() else ():
+        with suppress(ValueError):
+            key, *row = json.loads(line)
+            assert key not in found, "a row was made twice"
+            found[key] = row
+    return found | {path.name: path.stat().st_mtime_ns for path in runs.glob("*.npz")}
+
+
+def kill(child: subprocess.Popen, rng: np.random.Generator) -> None:
+    """Kill the child, one of its processes, or all."""
+    with suppress(ProcessLookupError, psutil.NoSuchProcess):
+        processes = psutil.Process(child.pid).children(recursive=True)
+        match rng.choice(["child", "worker", "all"]):
+            case "worker" if processes:
+                processes[rng.integers(len(processes))].kill()
+            case "all":
+                os.killpg(child.pid, signal.SIGKILL)
+            case _:
+                child.kill()
+
+
+def by_arm(table) -> list[float]:
+    return table.sort_values(["arm", "k"]).end.tolist()
+
+
+@pytest.mark.weekly
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="this system has no sessions")
+def test_forty_kills_lose_nothing_and_change_no_number(own, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "undisturbed"))
+    assert begun(own, tmp_path / "undisturbed").wait() == 0
+    table, records = of_file(own).made(), fetch_all(STUDY)
+    rng, kills, rounds, left = np.random.default_rng(42), 0, 0, None
+    while kills < KILLS or left:
+        runs = tmp_path / f"runs {rounds}"
+        left = left or begun(own, runs)
+        before = stored(runs)
+        with suppress(subprocess.TimeoutExpired):
+            left.wait(rng.uniform(0, LATEST) if kills < KILLS else None)
+        if left.poll() is None:
+            kill(left, rng)
+            kills += 1
+            time.sleep(0.2)
+        after = stored(runs)
+        assert before.items() <= after.items(), "something was lost or made again"
+        if left.poll() == 0:
+            monkeypatch.setenv("NMPCRL_RUNS", str(runs))
+            made = of_file(own).made()
+            assert by_arm(made) == by_arm(table)
+            assert all(RUNS.is_stored(one) for one in STUDY)
+            for one, found in fetch_all(STUDY).items():
+                assert_same_numbers(found, records[one])
+            rounds += 1
+        if left.poll() is not None:
+            left = None
+    assert rounds
