@@ -85,16 +85,14 @@ def _load(name: str) -> "Investigation":
 
 def _report(one: "Investigation", parts: tuple[str, ...]) -> None:
     """How many rows of each part are stored, and what the others take."""
-    from nmpcrl.study.refusal import Refusal
-
     for part in parts:
-        try:
-            every, missing, price = one.conditions(part), one.missing(part), one.price(part)
-        except Refusal as error:
-            click.echo(f"{part}: {error}")
-            continue
-        took = f"; the others take about {price / 60:.1f} minutes of one core" if missing else ""
-        click.echo(f"{part}: {len(every) - len(missing)} of {len(every)} rows are stored{took}")
+        rows, missing, seconds, unknown = one.price(part)
+        said = [f"{rows - missing} of {rows} rows are stored"] if rows else []
+        if missing:
+            said.append(f"the others take about {seconds / 60:.1f} minutes of one core")
+        if unknown:
+            said.append(f"with the arms of earlier rows, for {unknown}" if rows else unknown)
+        click.echo(f"{part}: {'; '.join(said)}")
 
 
 def _say(one: "Investigation", table: "pd.DataFrame") -> None:

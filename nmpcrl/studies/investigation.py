@@ -54,6 +54,15 @@ NAMES = list(Condition._fields)
 ROWS_OF = "rows of "  # before the name of an array: which rows of the table its entries belong to
 
 
+class Price(NamedTuple):
+    """The work that a part still takes."""
+
+    rows: int
+    missing: int  #: rows
+    seconds: float  #: of processor time
+    unknown: str  #: why the arms are not known yet, if they are not
+
+
 @dataclass(frozen=True)
 class Part:
     """Every arm in every place with every seed.
@@ -276,13 +285,23 @@ class Investigation:
             raise TypeError(f"{row!r} is no row: the function of part {one.part!r} returns a dict")
         return {"seconds": time.process_time() - began} | row
 
-    def price(self, part: str) -> float:
-        """Seconds of processor time that the missing rows of a part take."""
-        known, one = pd.concat([self.made(), self._published()]), self.parts[part]
+    def price(self, part: str) -> Price:
+        """The number of rows of a part, and the processor time of the missing ones.
+
+        While the arms are unknown, the published arms of earlier epochs take their place.
+        """
+        known, one, unknown = pd.concat([self.made(), self._published()]), self.parts[part], ""
         known = known[known.part == part]
+        try:
+            rows = [*self.conditions(part)]
+        except Refusal as error:
+            arms, unknown = known.arm.unique(), str(error)
+            rows = [Condition(part, arm, *at) for arm in arms for at in one.order(arm)]
+        made = self._lines()
+        missing = [each.arm for each in rows if self.key(each) not in made]
         means = known.groupby("arm").seconds.mean().dropna() if "seconds" in known else {}
-        asked = (each.arm for each in self.missing(part))
-        return float(sum(means.get(arm, one.seconds * one.episodes) for arm in asked))
+        seconds = sum(means.get(arm, one.seconds * one.episodes) for arm in missing)
+        return Price(len(rows), len(missing), float(seconds), unknown)
 
     def answers(self, table: pd.DataFrame) -> dict[str, Answer]:
         """The answers of a table to all questions, by name."""

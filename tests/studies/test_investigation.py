@@ -224,7 +224,8 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay():
     assert later.known().empty
     with pytest.raises(Refusal, match="depends on the part 'tune'"):
         later.conditions("judge")
-    assert later.price("tune") == 4 * 7.0  # of the earlier rows
+    assert later.price("tune") == (4, 4, 4 * 7.0, "")  # of the earlier rows
+    assert later.price("judge") == (3, 3, 3 * 7.0, "the arm depends on the part 'tune'")
     later.complete(["tune"], workers=1)
     whole = later.log.read_text()
     later.log.write_text(whole[: whole.rindex("\n")])
