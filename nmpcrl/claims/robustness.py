@@ -21,11 +21,16 @@ from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.learners import DECAYS
 
 Decision: TypeAlias = tuple[Outcome, tuple[int, int]]  # with yes and all answers
 
 WHOLE = "main table"
 PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures they read
+ROWS = {  # the field and value of each part, by the name of its row
+    **{f"layout {name}": ("layout", name) for name in design.LAYOUTS},
+    **{f"decay per {name}": ("decay", name) for name in DECAYS},
+}
 # `outcome` is compared with `base`; `changes` holds if both are decided and differ; `share` and
 # `base_share` are of yes; `pairs` is the number of answers; `p` is the probability of shares so
 # different without an effect (Fisher's exact test, as if runs were independent). A layout has no p:
@@ -50,7 +55,7 @@ def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame
     """The runs behind the row of a variant in the map, and the runs that it is compared with."""
     main, changed = (runs[runs.variant == name] for name in (MAIN_TABLE, variant))
     if changed.empty:
-        field, value = _part(variant)
+        field, value = ROWS[variant]
         return main[main[field] == value], main[main[field] != value]
     before = main.merge(changed[CELL].drop_duplicates(), on=CELL)
     unchanged = before[~before.learner.isin(changed.learner)]
@@ -61,13 +66,7 @@ def departure(variant: str) -> str:
     """The letter of the departure that a row of the map changes, or ""."""
     if variant in design.VARIANTS:
         return design.VARIANTS[variant].departure
-    return "" if variant == WHOLE else PARTS[_part(variant)[0]]
-
-
-def _part(variant: str) -> tuple[str, str]:
-    """Field and value of a row of `part_changes`: "layout A", "decay per step"."""
-    words = variant.split()
-    return words[0], words[-1]
+    return "" if variant == WHOLE else PARTS[ROWS[variant][0]]
 
 
 def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
@@ -123,9 +122,12 @@ def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:
     """
     parts = [(one, "", WHOLE, "all", one.outcome) for one in verdicts]
     for one in verdicts:
-        layouts, decays = one.by_layout.items(), one.by_decay.items()
-        parts += [(one, "layout", f"layout {name}", name, outcome) for name, outcome in layouts]
-        parts += [(one, "decay", f"decay per {name}", name, outcome) for name, outcome in decays]
+        outcomes = {"layout": one.by_layout, "decay": one.by_decay}
+        parts += [
+            (one, field, row, value, outcomes[field][value])
+            for row, (field, value) in ROWS.items()
+            if value in outcomes[field]
+        ]
     rows = []
     for one, field, variant, name, outcome in parts:
         (yes, of), (all_yes, all_of) = one.counts[name], one.counts["all"]

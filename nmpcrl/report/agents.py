@@ -4,7 +4,7 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.report.cited import Cited, Count
-from nmpcrl.studies.agents import AGENTS, SAC_AND_TD3, SEARCH, SEARCHED, course, searched
+from nmpcrl.studies.agents import AGENTS, SAC_AND_TD3, SEARCH, SEARCHED, course, rows_of, searched
 
 
 def costs(table: pd.DataFrame, suite: pd.DataFrame) -> dict[str, Cited]:
@@ -34,6 +34,4 @@ def counts(table: pd.DataFrame, suite: pd.DataFrame) -> dict[str, Cited]:
 
 def seconds(table: pd.DataFrame) -> dict[str, float]:
     """The mean processor time of each agent in a layout, with its budget."""
-    judged = table[table.part == "judge"]
-    return {agent: float(judged[judged.arm.str.startswith(agent)].seconds.mean())
-            for agent in AGENTS}  # fmt: skip
+    return {agent: float(rows_of(table, "judge", agent).seconds.mean()) for agent in AGENTS}

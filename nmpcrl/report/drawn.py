@@ -5,7 +5,7 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate, count
 from nmpcrl.claims.thresholds import improves
 from nmpcrl.studies.difficulty import OPEN, PILOT
-from nmpcrl.studies.population import CLAIMS, EXPECTED, Drawn
+from nmpcrl.studies.population import CLAIMS, EXPECTED, IMPROVES, Drawn
 from nmpcrl.study.drawn import name_of
 from nmpcrl.study.layouts import ARRIVED
 
@@ -36,7 +36,7 @@ def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
 def label(claim: str) -> str:
     """A claim of `EXPECTED`, and in few words what it says."""
     short = CLAIMS[claim].short.replace("\n", " ")
-    return claim if claim.endswith("improves") else f"{claim}: {short}"
+    return claim if claim in IMPROVES else f"{claim}: {short}"
 
 
 def share_table(shares: pd.DataFrame) -> pd.DataFrame:

@@ -19,7 +19,7 @@ import pandas as pd
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import suite
-from nmpcrl.analysis.suite import HELD_OUT, TOLERANCE, Entry
+from nmpcrl.analysis.suite import HELD_OUT, TOLERANCE, Entry, entry
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
 from nmpcrl.studies.investigation import Answer, Investigation, Part, cheaper, questions, share
 from nmpcrl.studies.remedies import REMEDIES
@@ -138,11 +138,17 @@ class Course:
         return {"median": float(self.median[-1]), "matches first": first, "matches from": always}
 
 
+def rows_of(table: pd.DataFrame, part: str, agent: str) -> pd.DataFrame:
+    """The rows of an agent in a part, with any setting."""
+    there = table[table.part == part]
+    return there[[entry(arm, AGENTS).name == agent for arm in there.arm]]
+
+
 def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()) -> Course:
     """The course of an agent in a part, in all layouts or `among` some; empty without runs."""
     points = CHECKPOINTS[part]
     shares, there = [pd.DataFrame(index=points)], [pd.DataFrame(index=points)]
-    for run in table[(table.part == part) & table.arm.str.startswith(agent)].itertuples():
+    for run in rows_of(table, part, agent).itertuples():
         units = [str(run.k)] if part == "one" else [*judged_in(run.place)]
         shares.append(pd.DataFrame(np.array(run.costs) / run.initial, points, units))
         there.append(pd.DataFrame([[*one] for one in run.arrived], points, units) == THERE)

@@ -96,9 +96,10 @@ EXPECTED: Mapping[str, Share] = {
     "RDES improves": Share(0.7, 0.95, PARTLY),
     "DES improves": Share(0.3, 0.8, PARTLY),
 }
+IMPROVES = {f"{one} improves": one for one in (*SOLVING, *IMITATING)}  # C9 of one learner
 _ASKED: Mapping[str, RunClaim] = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
 CLAIMS: Mapping[str, RunClaim] = {  # judged in each layout, by their names in `EXPECTED`
-    name: _ASKED.get(name) or replace(BY_RUNS["C9"], name=name, learners=(name.split()[0],))
+    name: _ASKED.get(name) or replace(BY_RUNS["C9"], name=name, learners=(IMPROVES[name],))
     for name in EXPECTED
 }
 

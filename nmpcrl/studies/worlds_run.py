@@ -37,6 +37,7 @@ MODEL = {
     "bias": Parameter(0.0, -1.0, 1.0),
     "drift": Parameter(np.zeros(2), -0.5, 0.5),
 }
+ORACLES = ("oracle", "oracle+ES")  # policies that begin with the model of the fault
 DRAWS = 5  # rollouts that judge theta where the fault draws
 THETA = np.array(paper.THETA_INIT)
 
@@ -139,7 +140,7 @@ def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row
     fault, policy = FAULTS[setting[0]], setting[1]
     nmpc = controller("diagonal" if policy in ("init", "grid", "ES") else "model")
     world = World(still(JUDGE[place]), fault=fault)
-    start = begin(nmpc, **(fault.model if policy.startswith("oracle") else {}))
+    start = begin(nmpc, **(fault.model if policy in ORACLES else {}))
     theta = theta_of(policy, nmpc, world, start, episodes, seed)
     draws = DRAWS if fault.slip or any(fault.noise) else 1
     made = [judged(nmpc, theta, world, draw) for draw in range(draws)]

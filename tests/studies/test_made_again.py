@@ -11,6 +11,7 @@ import pytest
 from history import INVESTIGATIONS
 
 from nmpcrl.studies.investigation import Condition, rounded
+from nmpcrl.studies.population import experiments
 from nmpcrl.study.learners import LEARNERS
 
 DRAWN = 5
@@ -31,8 +32,7 @@ def test_drawn_rows_made_afresh_are_the_published_ones(investigation, tmp_path, 
     if table.empty:
         pytest.skip(f"every published row of {investigation.name} is of earlier epochs")
     if investigation.name == "population":  # a network's products round otherwise on other machines
-        networks = [name for name, one in LEARNERS.items() if one.network]
-        table = table[~table.arm.str.split().str[0].isin(networks)]
+        table = table[[not LEARNERS[one.learner].network for one in experiments(table)]]
     order = np.random.default_rng(0).permutation(len(table))[:DRAWN]
     for row in table.iloc[order].to_dict("records"):
         one = Condition(*(row.pop(name) for name in Condition._fields))
