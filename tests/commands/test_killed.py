@@ -24,13 +24,14 @@ from nmpcrl.studies.investigation import of_file
 from nmpcrl.study import fetch_all, sweep
 from nmpcrl.study.store import RUNS
 
-KILLS, LATEST = 40, 9.0  # how often, and when at the latest [s]
+KILLS, LATEST = 40, 15.0  # how often, and when at the latest [s]
 STUDY = sweep(learner=("ES", "frozen"), seed=range(6), episodes=10)
 PROGRAM = """
 import sys
 from pathlib import Path
 from nmpcrl.studies.investigation import of_file
 from nmpcrl.study import fetch_all, sweep
+print(flush=True)
 fetch_all(sweep(learner=("ES", "frozen"), seed=range(6), episodes=10), workers=2, progress=False)
 of_file(Path(sys.argv[1])).complete(workers=2)
 """
@@ -39,19 +40,24 @@ of_file(Path(sys.argv[1])).complete(workers=2)
 @pytest.fixture
 def own(tmp_path) -> Path:
     path = tmp_path / "chain.py"
-    text, found = re.subn(r"(GAMMA, ALPHA, UPDATES = .*), 600", r"\1, 20_000", own_investigation())
+    text, found = re.subn(r"(GAMMA, ALPHA, UPDATES = .*), 600", r"\1, 8_000", own_investigation())
     assert found
     path.write_text(text)
     return path
 
 
 def begun(own: Path, runs: Path) -> subprocess.Popen:
-    """The child, in a session of its own."""
+    """The child, in a session of its own, once it has imported its libraries."""
     environment = os.environ | {"NMPCRL_RUNS": str(runs), "PYTHONPATH": str(Path.cwd())}
-    asked = [sys.executable, "-c", PROGRAM, str(own)]
-    return subprocess.Popen(
-        asked, env=environment, start_new_session=True, stderr=subprocess.DEVNULL
+    child = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(own)],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
+    child.stdout.readline()
+    return child
 
 
 def stored(runs: Path) -> dict[str, object]:
@@ -88,27 +94,25 @@ def test_forty_kills_lose_nothing_and_change_no_number(own, tmp_path, monkeypatc
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "undisturbed"))
     assert begun(own, tmp_path / "undisturbed").wait() == 0
     table, records = of_file(own).made(), fetch_all(STUDY)
-    rng, kills, rounds, left = np.random.default_rng(42), 0, 0, None
-    while kills < KILLS or left:
+    rng, kills, rounds, child = np.random.default_rng(42), 0, 0, None
+    while kills < KILLS or child:
         runs = tmp_path / f"runs {rounds}"
-        left = left or begun(own, runs)
+        child = child or begun(own, runs)
         before = stored(runs)
         with suppress(subprocess.TimeoutExpired):
-            left.wait(rng.uniform(0, LATEST) if kills < KILLS else None)
-        if left.poll() is None:
-            kill(left, rng)
+            child.wait(rng.uniform(0, LATEST) if kills < KILLS else None)
+        if child.poll() is None:
+            kill(child, rng)
             kills += 1
             time.sleep(0.2)
-        after = stored(runs)
-        assert before.items() <= after.items(), "something was lost or made again"
-        if left.poll() == 0:
+        assert before.items() <= stored(runs).items(), "something was lost or made again"
+        if child.poll() == 0:
             monkeypatch.setenv("NMPCRL_RUNS", str(runs))
-            made = of_file(own).made()
-            assert by_arm(made) == by_arm(table)
+            assert by_arm(of_file(own).made()) == by_arm(table)
             assert all(RUNS.is_stored(one) for one in STUDY)
             for one, found in fetch_all(STUDY).items():
                 assert_same_numbers(found, records[one])
-            rounds += 1
-        if left.poll() is not None:
-            left = None
-    assert rounds
+            rounds, child = rounds + 1, None
+        elif child.poll() is not None:
+            assert child.returncode == -signal.SIGKILL
+            child = begun(own, runs)
