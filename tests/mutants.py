@@ -126,6 +126,8 @@ MUTANTS = (  # a file, a part of one of its lines, and the mistake in its place
     ("studies/difficulty.py", "(raised.cost - first.cost) / RAISED", "raised.cost - first.cost"),
     ("studies/population.py", "(yes / of > MAJORITY", "(yes / of >= MAJORITY"),
     ("studies/population.py", "SEEDS * [*LAYOUTS]", "[*LAYOUTS]"),
+    ("studies/population.py", '"found by search" if found else ""', '"found by search"'),
+    ("studies/population.py", '"found by search" if', '"" if'),
     ("studies/interventions.py", "(by[than] - by[arm])", "(by[arm] - by[than])"),
     ("studies/remedies.py", "/ (there.initial - there.best)", "/ there.initial"),
     ("studies/remedies.py", "sort=False).all()", "sort=False).any()"),
