@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,6 +13,7 @@ import pandas as pd
 
 from nmpcrl.analysis.rows import EVAL_INSIDE, INSIDE, THETA, as_text
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.bench.learners import PAPER_HOURS
 from nmpcrl.claims.published import Evidence
 from nmpcrl.study import Experiment, Records, design, paper
 from nmpcrl.study.records import COLUMNS
@@ -22,6 +24,9 @@ AROUND = np.array([[-2.5, 1.5], [-2.5, 8.0], [3.0, 8.0], [8.5, 8.0], [8.5, 2.0]]
 TRAJECTORY = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
 STILL = np.empty(0)  # the inputs of a robot that is not moved
 CLOCKS = {"seconds"}
+SOLVERS = {"riccati": 0.04, "fatrop": 0.8, "ipopt": 2.0}  # [ms] of a solve
+SOLVES = {"ES": 2.0, "GES": 2.0, "RDES": 1.0, "DES": 1.0}  # of a step
+FIT, REST = 0.2, 0.02  # [ms]
 
 QUIET = {
     "stopped": "finished",
@@ -89,16 +94,29 @@ def quiet_row(experiment: Experiment, **unlike: Any) -> dict[str, Any]:
     return fields | QUIET | dict.fromkeys(NONE, 0) | theta | unlike
 
 
-def timings(rdes=0.5, ges=1.0, width=0.0, waited=0.0, solvers=("fatrop", "ipopt")) -> pd.DataFrame:
-    """Ratios of the times of a step, with intervals as wide on either side."""
-    ratios = {"ES": 1.0, "RDES": rdes, "GES": ges}
-    rows = [
-        (solver, learner, waited, ratio, ratio - width, ratio + width)
-        for solver in solvers
-        for learner, ratio in ratios.items()
-    ]
-    columns = ["solver", "learner", "waited", "ratio", "ratio_low", "ratio_high"]
-    return pd.DataFrame(rows, columns=columns)
+def timings(
+    rdes=None, ges=None, width=0.0, waited=0.0, solvers=("fatrop", "ipopt")
+) -> pd.DataFrame:
+    """Times of learning steps, as of `time_learners`, in which only solves differ.
+
+    Args:
+        rdes: its ratio to ES, if it is not that of its parts.
+        ges: likewise.
+        width: of a ratio's interval, on either side.
+        waited: share of the time.
+        solvers: of `SOLVERS`.
+    """
+    rows = []
+    for solver, (name, solves) in product(solvers, SOLVES.items()):
+        solve, fit = SOLVERS[solver], FIT if name in ("RDES", "DES") else np.nan
+        step = solves * solve + np.nan_to_num(fit) + REST
+        ratio = {"RDES": rdes, "GES": ges}.get(name) or step / (2 * solve + REST)
+        hours = {"hours": step * 39 / 3600, "hours_paper": PAPER_HOURS.get(name, np.nan)}
+        parts = {"solver": solver, "learner": name, "solves": solves, "ms_per_step": step}
+        parts |= {"ms_per_solve": solve, "ms_per_fit": fit, "ms_per_rest": REST, "waited": waited}
+        ends = {"ratio": ratio, "ratio_low": ratio - width, "ratio_high": ratio + width}
+        rows.append(parts | hours | ends)
+    return pd.DataFrame(rows)
 
 
 def evidence_of(

@@ -7,15 +7,14 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import builders
 import numba
 import numpy as np
 import pandas as pd
 import pytest
 import tenths
-from builders import evidence_of
 from hypothesis import settings
 
-from nmpcrl.bench.learners import PAPER_HOURS
 from nmpcrl.claims.published import Evidence
 from nmpcrl.control import differential_drive
 from nmpcrl.study import jobs, paper
@@ -189,29 +188,13 @@ def robot_module() -> bytes:
     return browser.module(differential_drive(), paper.task("A"))
 
 
-SOLVERS = {"riccati": 0.04, "fatrop": 0.8, "ipopt": 2.0}  # [ms] of a solve
-SOLVES = {"ES": 2.0, "GES": 2.0, "RDES": 1.0, "DES": 1.0}
-FIT, REST = 0.2, 0.02  # [ms]
-
-
 @pytest.fixture
 def timings() -> pd.DataFrame:
-    """Times of learning steps, as of `time_learners`, in which only solves differ."""
-    rows = []
-    for solver, solve in SOLVERS.items():
-        for name, count in SOLVES.items():
-            fit = FIT if name in ("RDES", "DES") else np.nan
-            step, one = count * solve + np.nan_to_num(fit) + REST, 2 * solve + REST
-            parts = {"solves": count, "ms_per_step": step, "ms_per_solve": solve, "ms_per_fit": fit}
-            hours = {"hours": step * 39 / 3600, "hours_paper": PAPER_HOURS.get(name, np.nan)}
-            ratio = {"ratio": step / one, "ratio_low": step / one - 0.01}
-            ratio |= {"ratio_high": step / one + 0.01, "waited": 0.0}
-            named = {"solver": solver, "learner": name}
-            rows.append(named | parts | {"ms_per_rest": REST} | hours | ratio)
-    return pd.DataFrame(rows)
+    """Times that nobody measured, with each solver."""
+    return builders.timings(width=0.01, solvers=tuple(builders.SOLVERS))
 
 
 @pytest.fixture(scope="session")
 def made_up() -> Callable[..., Evidence]:
     """Makes evidence, as `builders.evidence_of` says."""
-    return evidence_of
+    return builders.evidence_of

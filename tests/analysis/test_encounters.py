@@ -29,14 +29,11 @@ def test_a_rollout_is_judged_by_its_true_states():
     assert np.abs(np.diff(one.states[:, 0])).max() <= 0.12 + 1e-9  # no jump by a measurement
 
 
-def test_crowding_is_the_share_of_the_rectangle_and_grows_with_every_obstacle():
+def test_crowding_is_the_share_of_the_rectangle_and_counts_obstacles_where_a_robot_meets_them():
     one = crowding(still([(3.0, 1.75)]))
     share = np.pi * 1.25**2 / (11.0 * (0.5 + 2 * 2.5))
     assert one == pytest.approx(share, rel=0.1)
     assert crowding(still([(99.0, 99.0)])) == 0
     assert crowding(still(paper.LAYOUTS["A"])) > one
-
-
-def test_an_obstacle_counts_where_a_robot_would_meet_it():
     early, late = ([Straight((x, 1.75), (v, 0.0))] for x, v in ((-2.5, 0.42), (-2.5, 5.0)))
     assert crowding(early) > 3 * crowding(late)

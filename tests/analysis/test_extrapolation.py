@@ -58,18 +58,11 @@ def test_the_first_theta_of_an_episode_predicts_and_the_true_slope_is_the_change
     assert found == values
 
 
-@pytest.fixture(scope="module")
-def outcomes():
-    return {name: watch(Experiment("RDES", **SHORT), name) for name in INTERVENTIONS}
-
-
-def test_interventions_change_nothing_before_the_network_is_fitted(outcomes):
-    # 90 steps are fewer than a batch: theta waits until the second episode
+def test_a_run_without_an_intervention_is_the_studys_and_others_differ_once_a_network_is_fitted():
+    """90 steps are fewer than a batch: theta waits until the second episode."""
+    outcomes = {name: watch(Experiment("RDES", **SHORT), name) for name in INTERVENTIONS}
     assert all(np.isnan([one.delta[0], one.feedback[0]]).all() for one in outcomes.values())
     assert len({one.delta[1] for one in outcomes.values()}) == len(outcomes)
-
-
-def test_the_run_without_an_intervention_is_a_run_of_the_study(outcomes):
     steps = run(Experiment("RDES", **SHORT)).steps
     assert outcomes["none"].episodes == 2
     delta = steps["delta"][steps["episode"] == 1]

@@ -18,33 +18,26 @@ def made_up(value, theta, *, episodes=5, steps=60):
     return Records({"theta": theta[0]}, columns | {"value": value(state, before)}, {}, {})
 
 
-@pytest.fixture
-def moving():
-    """theta in [0, 2]^9, another one at every step."""
-    return np.random.default_rng(1).uniform(0, 2, (300, 9))
+MOVING = np.random.default_rng(1).uniform(0, 2, (300, 9))  # another theta at every step
 
 
-def test_a_network_without_theta_cannot_follow_a_value_that_depends_on_it(moving):
-    records = made_up(lambda _, theta: 10 * theta[:, 0], moving)
+def test_only_a_network_with_theta_follows_a_value_that_depends_on_it_and_both_any_other():
+    records = made_up(lambda _, theta: 10 * theta[:, 0], MOVING)
     assert imitate(records, fits=500).ratio < 0.5
-
-
-def test_both_networks_learn_a_value_that_does_not_depend_on_theta(moving):
-    records = made_up(lambda state, _: 10 * state[:, 0], moving)
-    imitation = imitate(records, fits=1000)
+    imitation = imitate(made_up(lambda state, _: 10 * state[:, 0], MOVING), fits=1000)
     assert imitation.error("without_theta") < 0.3 * imitation.value.std()
     squares = (imitation.without_theta - imitation.value) ** 2
     assert imitation.error("without_theta") == pytest.approx(np.sqrt(squares.mean()))
     assert imitation.error("with_theta") < 0.5 * imitation.value.std()
 
 
-def test_every_fifth_episode_is_held_out_or_the_last_and_a_failed_solve_is_left_out(moving):
+def test_every_fifth_episode_is_held_out_or_the_last_and_a_failed_solve_is_left_out():
     def value(state, _):
         return state[:, 0]
 
-    records = made_up(value, moving)
+    records = made_up(value, MOVING)
     assert {*imitate(records, fits=1).episode} == {HELD_OUT - 1}
-    few = made_up(value, moving[:240], episodes=3, steps=80)
+    few = made_up(value, MOVING[:240], episodes=3, steps=80)
     assert {*imitate(few, fits=1).episode} == {2}
     records.steps["value"][-10:] = np.nan
     first, again = (imitate(records, fits=20) for _ in range(2))

@@ -47,15 +47,6 @@ def test_the_training_cost_is_the_sum_over_each_episode_that_went_to_its_end(
 
 
 @pytest.mark.parametrize(
-    ("judged", "final"),
-    [([100, 50, 40, 30, 20], 30), ([100, 150, 150, 150], 150), ([100, 50, np.inf, 40], np.inf)],
-)
-def test_the_final_cost_is_the_mean_of_the_last_rollouts(judged, final):
-    run = records([[1]], judged=judged)
-    assert (metrics.initial_cost(run), metrics.final_cost(run)) == (100, final)
-
-
-@pytest.mark.parametrize(
     ("judged", "at", "expected"),
     [
         ([100, 900, 70, 60, 65], [0, 1, 2, 3, 4], 0.1),

@@ -18,12 +18,8 @@ def frozen(theta_c):
     return summarise(run(Experiment("frozen", layout="E", theta=theta, episodes=2)))
 
 
-@pytest.fixture(scope="module")
-def standing():
-    return frozen(0.2)
-
-
-def test_before_a_closed_gap_the_robot_stands_and_its_td_error_is_above_0(standing):
+def test_before_a_closed_gap_the_robot_stands_and_its_td_error_is_above_0():
+    standing = frozen(0.2)
     found = ending(standing)
     assert found["moved"] < 0.05
     assert 0 < found["worth"] < 1
@@ -34,12 +30,8 @@ def test_before_a_closed_gap_the_robot_stands_and_its_td_error_is_above_0(standi
     delta = np.r_[np.full(20, 3.0), 9.0, np.full(20, 4.0), np.nan]
     arrived = replace(frozen(paper.THETA_INIT[-1]), episodes={"delta": delta})
     np.testing.assert_array_equal([*ending(arrived).values()], [np.nan, np.nan, 3, 4, np.nan])
-
-
-def test_a_stand_is_the_end_of_a_rollout_and_agrees_with_the_summary(standing):
     learned = replace(standing, episodes=standing.episodes | {"delta": np.array([7.0, 3.0])})
-    first, last = stands(learned, (0, 2))
-    found = ending(standing)
+    first, last = stands(learned, (0, 2))  # which agree with the summary
     assert (first.episode, last.episode) == (0, 2)
     assert np.isnan(first.delta)
     assert last.delta == 3

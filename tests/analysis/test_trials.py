@@ -12,24 +12,20 @@ from nmpcrl.study import Trial, paper, run
 
 THETA = paper.THETA_INIT
 EPISODES, STEPS = 3, 6
+NMPC = paper.nmpc()
 
 
-@pytest.fixture(scope="module")
-def nmpc():
-    return paper.nmpc()
-
-
-def rows(nmpc, learner, make, **options):
+def rows(learner, make, **options):
     options = {"evaluate_every": 1, **options}
-    one = Trial(learner, make, nmpc, THETA, episodes=EPISODES, steps=STEPS, **options)
+    one = Trial(learner, make, NMPC, THETA, episodes=EPISODES, steps=STEPS, **options)
     return evaluations([run(one)])
 
 
 @pytest.mark.parametrize(("every", "judged"), [(1, [0, 1, 2, 3]), (2, [0, 2, 3])])
-def test_a_frozen_theta_costs_the_same_whenever_it_is_judged_and_at_the_end(nmpc, every, judged):
-    found = rows(nmpc, "frozen", frozen, evaluate_every=every)
+def test_a_frozen_theta_costs_the_same_whenever_it_is_judged_and_at_the_end(every, judged):
+    found = rows("frozen", frozen, evaluate_every=every)
     assert found.episode.tolist() == judged
-    assert {*found.cost} == {evaluate(nmpc, np.array(THETA), STEPS).cost}
+    assert {*found.cost} == {evaluate(NMPC, np.array(THETA), STEPS).cost}
     assert {*found.learner} == {"frozen"}
 
 
@@ -44,8 +40,8 @@ def lost(nmpc, at):
 
 
 @pytest.mark.parametrize("at", [1, STEPS])
-def test_a_run_that_diverges_ends_in_an_infinite_cost(nmpc, at):
-    found = rows(nmpc, "lost", partial(lost, at=at))
+def test_a_run_that_diverges_ends_in_an_infinite_cost(at):
+    found = rows("lost", partial(lost, at=at))
     assert found.cost.iloc[-1] == np.inf
     assert found.episode.iloc[-1] == EPISODES
     assert np.isfinite(found.cost.iloc[:-1]).all()

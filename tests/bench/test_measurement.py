@@ -39,32 +39,28 @@ def test_what_was_measured_is_read_again(counted, timings):
     assert list(folder().iterdir()) == [measurement.path()]
 
 
+CHANGES = [(measurement, "machine"), (measurement.provenance, "environment")]
+CHANGES += [(measurement.lock, name) for name in ("sources_hash", "code")]
+
+
 @pytest.mark.parametrize(
-    ("kept", "asked", "again"),
-    [("full", "short", False), ("short", "smoke", False), ("smoke", "short", True)],
+    ("kept", "asked", "change", "again"),
+    [
+        ("full", "short", (), False),  # a longer measurement serves for a shorter one
+        ("short", "smoke", (), False),
+        ("smoke", "short", (), True),
+        *(("short", "short", change, True) for change in CHANGES),
+    ],
 )
-def test_a_longer_measurement_serves_for_a_shorter_one(counted, kept, asked, again):
+def test_a_shorter_measurement_another_machine_version_or_source_measures_again(
+    counted, monkeypatch, kept, asked, change, again
+):
     measurement.read_or_measure(kept)
+    if change:
+        monkeypatch.setattr(*change, lambda *_: {"numba": "other"})
     found = measurement.read_or_measure(asked)
     assert counted == ([kept, asked] if again else [kept])
     assert found.length == (asked if again else kept)
-
-
-@pytest.mark.parametrize(
-    ("owner", "changed"),
-    [
-        (measurement, "machine"),
-        (measurement.provenance, "environment"),
-        (measurement.lock, "sources_hash"),
-        (measurement.lock, "code"),
-    ],
-    ids=lambda one: one if isinstance(one, str) else "",
-)
-def test_another_machine_version_or_source_measures_again(counted, monkeypatch, owner, changed):
-    measurement.read_or_measure("short")
-    monkeypatch.setattr(owner, changed, lambda *_: {"numba": "other"})
-    measurement.read_or_measure("short")
-    assert counted == ["short", "short"]
 
 
 @pytest.mark.parametrize("content", ["{", "[]", "{}", '{"timings": 1}'])

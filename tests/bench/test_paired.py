@@ -73,10 +73,7 @@ def test_too_few_rounds_have_no_interval(blocks, known):
     mine, theirs = drawn(0, 1.0, blocks * BLOCK + BLOCK - 1)
     found = paired_ratio(mine, theirs, mine, theirs)
     assert np.isfinite([found.low, found.high]).all() == known
-
-
-def test_the_share_of_waiting_is_what_the_two_clocks_disagree_by():
-    mine, theirs = drawn(0, 0.5)
+    mine, theirs = drawn(0, 0.5)  # the share of waiting is what two clocks disagree by
     assert paired_ratio(mine, theirs, 4 * mine, 4 * theirs).waited == pytest.approx(0.75)
     assert paired_ratio(mine, theirs, mine / 2, theirs / 2).waited == 0  # threads beside each other
 

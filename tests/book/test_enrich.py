@@ -2,8 +2,11 @@
 
 import pytest
 from driver.build.render import download
-from driver.page import enrich, prose
+from driver.page import enrich, extension, prose
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+
+PANDAS = """<p>so</p><table class="dataframe"><thead><tr><th></th><th>cost</th></tr></thead>
+<tbody><tr><th>A</th><td>1.0</td></tr></tbody></table>"""
 
 
 def dressed(*cells) -> list:
@@ -118,3 +121,18 @@ def test_a_page_begins_with_what_was_found_and_has_one_set_up():
     assert "**Learning goals.**" in goals.source
     assert set_up.source == "layout = 'A'\n\nimport numpy"
     assert "hide-input" in set_up.metadata["tags"]
+
+
+def test_tables_have_headers_with_a_scope_and_scroll_and_all_else_stays():
+    def body(html: str) -> str:
+        context = {"body": html}
+        extension.accessible(None, "page", "page.html", context, None)
+        return context["body"]
+
+    html = body(PANDAS)
+    assert '<th scope="col">cost</th>' in html
+    assert '<th scope="row">A</th>' in html
+    assert '<div class="scrolls" tabindex="0"><table' in html
+    assert "<tr><td></td>" in html  # a header of nothing is a cell
+    assert 'scope="colgroup"' in body('<table><tr><th scope="colgroup">A</th></tr></table>')
+    assert body("<p>theory</p>") == "<p>theory</p>"

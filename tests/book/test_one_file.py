@@ -1,6 +1,5 @@
 """The paper in one file trains as the library does, to the tolerance of its solver."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +10,6 @@ from nmpcrl.study import Experiment, run
 from nmpcrl.study.setup import job_of
 
 FILE = Path(__file__).parents[2] / "book" / "one_file.py"
-
-
-@pytest.fixture(scope="module")
-def one_file():
-    spec = importlib.util.spec_from_file_location("one_file", FILE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def drawn_by(network):
@@ -35,8 +26,10 @@ def drawn_by(network):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("learner", ["ES", "RDES", "GES"])
-def test_two_episodes_are_those_of_the_library(one_file, monkeypatch, learner):
+def test_two_episodes_are_those_of_the_library(monkeypatch, learner):
     """Costs to 1e-6 of them, and theta to 1e-6 where its steps are up to 0.4."""
+    import one_file
+
     experiment = Experiment(learner=learner, episodes=2)
     if learner == "RDES":
         network = job_of(experiment).learner.bootstrap.network

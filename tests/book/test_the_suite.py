@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 import nbformat
-import pytest
 
 from nmpcrl.analysis.suite import Robot, gain, judge, solved
 
@@ -16,17 +15,10 @@ BOOK = Path(__file__).resolve().parents[2] / "book"
 )
 
 
-@pytest.fixture
-def factory():
-    """What the page shows."""
+def test_the_entry_of_the_page_keeps_to_the_budget_and_saves_cost():
     (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.M | re.S)
-    space = {}
-    exec(code, space)
-    return space["factory"]
-
-
-def test_its_entry_keeps_to_the_budget_and_saves_cost(factory):
-    found = judge(factory, "T01", 0, 4)
+    exec(code, space := {})
+    found = judge(space["factory"], "T01", 0, 4)
     assert (found.episodes, found.over) == (4, False)
     assert solved(found)
     assert gain(found) > 0
@@ -34,6 +26,5 @@ def test_its_entry_keeps_to_the_budget_and_saves_cost(factory):
 
 def test_a_robot_has_all_that_the_page_names():
     named = set(re.findall(r"`robot\.(\w+)", PAGE))
-    robot = Robot("T01", 2, 0)
     assert len(named) > 9
-    assert all(hasattr(robot, name) for name in named)
+    assert all(hasattr(Robot("T01", 2, 0), name) for name in named)

@@ -9,13 +9,7 @@ from builders import summary_of
 
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import thresholds
-from nmpcrl.claims.failure_modes import (
-    OVER_PREDICTED,
-    Mechanism,
-    ending,
-    mechanism,
-    rise,
-)
+from nmpcrl.claims.failure_modes import OVER_PREDICTED, Mechanism, ending, mechanism, rise
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, paper
 

@@ -8,12 +8,7 @@ from builders import quiet_row
 from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.analysis.statistics import paired_p
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.robustness import (
-    WHOLE,
-    part_changes,
-    readings_of_des,
-    robustness_map,
-)
+from nmpcrl.claims.robustness import WHOLE, part_changes, readings_of_des, robustness_map
 from nmpcrl.claims.rule import judge
 from nmpcrl.claims.thresholds import divergence
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict

@@ -10,12 +10,6 @@ COUNT = 8
 PARTS = ("value", "features", "point", "iterations", "violation", "restarts", "status", "action")
 
 
-@pytest.fixture(scope="module")
-def nmpc() -> Nmpc:
-    """A pendulum, by riccati."""
-    return Nmpc(pendulum())
-
-
 def drawn(nmpc: Nmpc, count: int = COUNT, seed: int = 0):
     """States, thetas, actions and data of a batch."""
     rng, of = np.random.default_rng(seed), nmpc.problem
@@ -76,7 +70,8 @@ def test_what_cannot_be_solved_is_marked_and_leaves_the_others_alone():
     assert (beyond.status == "refused").all()
 
 
-def test_a_shape_is_refused_with_the_one_to_give(nmpc):
+def test_a_shape_is_refused_with_the_one_to_give():
+    nmpc = Nmpc(pendulum())
     states, thetas, actions, _ = drawn(nmpc, 3)
     for given, said in (
         ((states[0], thetas), r"states has shape \(2,\); it must be \(B, 2\)"),

@@ -82,12 +82,8 @@ def test_a_copy_solves_as_the_original_does_and_a_copied_solution_is_a_warm_star
 
 def test_another_process_finds_the_same_key_and_the_same_bits():
     given = controllers()[0]
-    ran = subprocess.run(
-        [sys.executable, "-c", ELSEWHERE],
-        input=pickle.dumps(given),
-        capture_output=True,
-        check=True,
-    )
+    asked, command = pickle.dumps(given), [sys.executable, "-c", ELSEWHERE]
+    ran = subprocess.run(command, input=asked, capture_output=True, check=True)
     nmpc, state, theta = given
     key, solution = pickle.loads(ran.stdout)
     assert key == nmpc.key

@@ -10,33 +10,25 @@ from nmpcrl.control import Nmpc, Policy
 from nmpcrl.learning import evaluate
 
 STATE, STEPS = np.array([0.6, -0.4]), 6
+NMPC = Nmpc(pendulum(), solver="fatrop")
+THETA = NMPC.problem.vector(rate=1.5)
 
 
-@pytest.fixture(scope="module")
-def nmpc() -> Nmpc:
-    return Nmpc(pendulum(), solver="fatrop")
-
-
-@pytest.fixture(scope="module")
-def theta(nmpc):
-    return nmpc.problem.vector(rate=1.5)
-
-
-def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before(nmpc, theta):
-    policy = Policy(nmpc, theta)
+def test_a_policy_acts_as_a_rollout_does_and_remembers_the_plan_before():
+    policy = Policy(NMPC, THETA)
     for _ in range(2):
         policy.reset()
-        loop = evaluate(nmpc, theta, STEPS, plant=nmpc.problem.plant(), start=STATE)
+        loop = evaluate(NMPC, THETA, STEPS, plant=NMPC.problem.plant(), start=STATE)
         assert [policy(state).tolist() for state in loop.states] == loop.actions.tolist()
 
 
 @pytest.mark.parametrize(
     "data", [{"wind": 0.1 * np.arange(9.0)}, lambda t: {"wind": 0.1 * np.arange(t, t + 7.0)}]
 )
-def test_each_way_of_calling_sees_the_data_of_its_time(nmpc, theta, data):
+def test_each_way_of_calling_sees_the_data_of_its_time(data):
     """A forecast of 9 stages, of which 7 are seen at a time."""
-    loop = evaluate(nmpc, theta, 3, plant=nmpc.problem.plant(), start=STATE, data=data)
-    policy, wanted, before = Policy(nmpc, theta, data), loop.actions.tolist(), None
+    loop = evaluate(NMPC, THETA, 3, plant=NMPC.problem.plant(), start=STATE, data=data)
+    policy, wanted, before = Policy(NMPC, THETA, data), loop.actions.tolist(), None
     assert [policy(state).tolist() for state in loop.states] == wanted
     policy.reset()
     assert [policy.make_step(state)[:, 0].tolist() for state in loop.states] == wanted
@@ -46,8 +38,8 @@ def test_each_way_of_calling_sees_the_data_of_its_time(nmpc, theta, data):
     assert policy.predict(STATE, before, np.array([True]))[0].tolist() == wanted[0]
 
 
-def test_a_policy_is_saved_and_loaded_to_the_last_bit(nmpc, theta, tmp_path):
-    policy = Policy(nmpc, theta)
+def test_a_policy_is_saved_and_loaded_to_the_last_bit(tmp_path):
+    policy = Policy(NMPC, THETA)
     wanted = policy(STATE)
     policy.save(tmp_path / "policy")
     loaded = Policy.load(tmp_path / "policy")

@@ -45,12 +45,9 @@ def test_the_penalty_vanishes_at_a_centre_distance_of_1452_millimetres(angle):
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_the_penalty_adds_up_over_obstacles(count):
+def test_the_penalty_adds_up_over_obstacles_and_a_target_may_lie_outside_the_box(count):
     some = task(obstacles=(Obstacle(0.5, 2.2),) * count)
     at = np.array([0.5, 2.2, 0.0])
     assert some.overlap(at).shape == (count,)
     assert some.collision_penalty(at) == pytest.approx(count * 50 * 1.35)
-
-
-def test_a_target_outside_the_box_can_be_asked_for():
     assert task(**BEHIND, target_may_lie_outside=True).target[0] == 8.5

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -88,28 +88,26 @@ def processor() -> str:
     return short(sorted({one for one in told if one.startswith(("flags", "Features"))}))
 
 
-def differing(now: Any, then: Any, tolerance: float = 0.0, where: str = "") -> list[str]:
+def differing(now: Any, then: Any, tolerance: float = 0.0) -> list[str]:
     """Where two plain values differ, a line each; floats by more than a relative tolerance."""
-    if isinstance(now, dict) and isinstance(then, dict):
-        names = [*now, *(name for name in then if name not in now)]
-        gone = object()
-        return [
-            line
-            for name in names
-            for line in differing(
-                now.get(name, gone), then.get(name, gone), tolerance, f"{where}/{name}"
-            )
-        ]
-    if isinstance(now, list) and isinstance(then, list) and len(now) == len(then):
-        pairs = enumerate(zip(now, then, strict=True))
-        return [line for i, pair in pairs for line in differing(*pair, tolerance, f"{where}[{i}]")]
-    floats = isinstance(now, float) and isinstance(then, float)
-    if now == then and type(now) is type(then):
-        return []
-    if floats and math.isclose(now, then, rel_tol=tolerance, abs_tol=tolerance):
-        return []
-    return [f"{where}: {_shown(now)} now, {_shown(then)} as frozen"]
+    one, other = (dict(_leaves(value)) for value in (now, then))
+    return [
+        f"{where}: {one.get(where, 'nothing')!r} now, {other.get(where, 'nothing')!r} as frozen"
+        for where in one | other
+        if not _alike(one.get(where, ...), other.get(where, ...), tolerance)
+    ]
 
 
-def _shown(value: Any) -> str:
-    return "nothing" if type(value) is object else repr(value)
+def _leaves(value: Any, where: str = "") -> Iterator[tuple[str, Any]]:
+    named = value.items() if isinstance(value, dict) else enumerate(value)
+    for name, one in named:
+        if one and isinstance(one, dict | list):
+            yield from _leaves(one, f"{where}/{name}")
+        else:
+            yield f"{where}/{name}", one
+
+
+def _alike(one: Any, other: Any, tolerance: float) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=tolerance, abs_tol=tolerance)
+    return type(one) is type(other) and one == other

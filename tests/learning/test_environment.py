@@ -10,13 +10,7 @@ from learning.small_runs import THETA, noise, run
 
 from nmpcrl.control import Plant, differential_drive
 from nmpcrl.control.solution import short
-from nmpcrl.learning import (
-    Diverged,
-    evaluate,
-    expected_sarsa,
-    frozen,
-    q_learning,
-)
+from nmpcrl.learning import Diverged, evaluate, expected_sarsa, frozen, q_learning
 
 PRICES = np.array([0.1, 2.0, 0.5, 0.1, 3.0])
 

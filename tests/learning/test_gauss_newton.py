@@ -22,11 +22,8 @@ class Recorder:
 @pytest.fixture(scope="module")
 def free() -> Nmpc:
     """The paper's robot without obstacles, at rest near its target."""
-    task = Task(
-        start=np.array([0.3, 0.2, 0.4]), target=np.zeros(3), lower=np.full(3, -9.0),
-        upper=np.full(3, 9.0),
-    )  # fmt: skip
-    return Nmpc(differential_drive(), task)
+    far = np.full(3, 9.0)
+    return Nmpc(differential_drive(), Task([0.3, 0.2, 0.4], np.zeros(3), -far, far))
 
 
 def charged(x, u, d):

@@ -115,15 +115,11 @@ def test_the_gradient_is_that_of_mpcrl():
     np.testing.assert_allclose(found, fisher @ w, rtol=1e-8)
 
 
-def test_a_state_that_ends_an_episode_is_worth_nothing():
+def test_a_state_that_ends_an_episode_is_worth_nothing_and_a_fixed_action_is_refused():
     one = transition(np.array([1.0, 2.0]), np.array([E]), end=True)
     phi = monomials(one.state)
     found, *_ = policy_statistics(Gain(), one, np.nan)
     np.testing.assert_allclose(found, np.outer(phi, phi))
-
-
-def test_a_solution_with_a_fixed_action_is_refused():
-    one = transition(np.array([1.0, 2.0]), np.array([E]))
     one.solution.ocp.fixed_action = np.zeros(1)
     with pytest.raises(ValueError, match="call train without constrained"):
         policy_gradient(Gain()).step(Weights(K.ravel()), one)

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from learning.small_runs import differences
 
-from nmpcrl.learning import (
-    Transition,
-    Weights,
-    gradient_expected_sarsa,
-    gradient_tdc,
-)
+from nmpcrl.learning import Transition, Weights, gradient_expected_sarsa, gradient_tdc
 
 ALPHA, BETA = 0.1, 0.01
 

@@ -12,12 +12,7 @@ from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.learning import updates
 from nmpcrl.report import prose
 from nmpcrl.report.cited import Count, by_reading
-from nmpcrl.report.prose import (
-    filled,
-    listing,
-    say,
-    source,
-)
+from nmpcrl.report.prose import filled, listing, say, source
 
 WORDS = st.text("abc XYZ.,;:$=-+*|\\^_", max_size=12)
 
@@ -40,32 +35,27 @@ def test_what_stands_around_a_number_is_kept(before, after, number):
     assert filled(template, number=number) == f"a{before} {number:.3e}{after}z"
 
 
-def test_a_placeholder_without_a_number_is_refused_by_name():
-    with pytest.raises(NameError, match=r"no number is given for \{cost\} in: it costs"):
-        filled("it costs {cost:.2f}")
+@pytest.mark.parametrize(
+    ("template", "numbers", "said"),
+    [
+        ("it costs {cost:.2f}", {}, r"no number is given for \{cost\} in: it costs"),
+        (
+            "it costs nothing",
+            {"cost": 3.0},
+            r"cost is given, and there is no \{cost\} in: it costs",
+        ),
+    ],
+)
+def test_a_placeholder_and_a_number_without_each_other_are_refused_by_name(template, numbers, said):
+    with pytest.raises(NameError, match=said):
+        filled(template, **numbers)
 
 
-def test_a_number_without_a_placeholder_is_refused_by_name():
-    with pytest.raises(NameError, match=r"cost is given, and there is no \{cost\} in: it costs"):
-        filled("it costs nothing", cost=3.0)
-
-
-@pytest.fixture
-def shown(monkeypatch):
-    """Calls something and gives the Markdown that it displays, which is one."""
-
-    def call(function, *arguments, **numbers) -> str:
-        displayed = []
-        monkeypatch.setattr(prose, "display", displayed.append)
-        function(*arguments, **numbers)
-        (markdown,) = displayed
-        return markdown.data
-
-    return call
-
-
-def test_source_displays_the_file_and_the_very_text_of_the_library(shown):
-    text = shown(source, updates.td_error)
+def test_source_displays_the_file_and_the_very_text_of_the_library(monkeypatch):
+    displayed = []
+    monkeypatch.setattr(prose, "display", displayed.append)
+    source(updates.td_error)
+    (text,) = (markdown.data for markdown in displayed)
     assert text.startswith("`nmpcrl/learning/updates.py`\n\n```python\ndef td_error(")
     assert inspect.getsource(updates.td_error).strip() in text
 
@@ -73,24 +63,18 @@ def test_source_displays_the_file_and_the_very_text_of_the_library(shown):
 def test_what_only_exists_compiled_and_a_constant_are_shown_by_name():
     assert "\n@inlined\ndef centre(task, " in listing("nmpcrl.control.solvers.kernel:centre")
     assert "\nLAYOUTS = (" in listing("nmpcrl.study.design:LAYOUTS")
-
-
-def test_a_name_that_is_not_defined_is_refused():
     with pytest.raises(NameError, match="center"):
         listing("nmpcrl.control.solvers.kernel:center")
 
 
-def test_a_number_with_an_origin_carries_its_value_and_what_it_is_of():
+def test_a_number_with_an_origin_carries_its_value_its_interval_and_what_it_is_of():
+    shown = filled("{rate:.2f}", origin="us", rate=Estimate(0.5, 0.25, 0.75))
+    assert shown.startswith('<data value="0.5 [0.25, 0.75]" title="rate: us">0.50 [')
     said = filled("It cost {left:.0%} in {n}.", origin="720 runs", left=0.123, n=Count(3, 6))
     assert said == (
         'It cost <data value="0.123" title="left: 720 runs">12%</data> in'
         ' <data value="3 of 6" title="n: 720 runs">3 of 6</data>.'
     )
-
-
-def test_an_estimate_carries_its_interval():
-    shown = filled("{rate:.2f}", origin="us", rate=Estimate(0.5, 0.25, 0.75))
-    assert shown.startswith('<data value="0.5 [0.25, 0.75]" title="rate: us">0.50 [')
 
 
 @pytest.mark.parametrize(

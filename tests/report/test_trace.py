@@ -11,28 +11,14 @@ from nmpcrl.study import paper
 from nmpcrl.study.problems import gros_zanon
 
 BUSY = np.array([-0.6, 1.4, -0.4])  # in front of an obstacle
-
-
-@pytest.fixture(scope="module")
-def nmpc():
-    return paper.nmpc(solver=Riccati(starts=1))
-
-
-@pytest.fixture(scope="module")
-def theta():
-    return np.array(paper.THETA_INIT)
-
-
-@pytest.fixture(scope="module")
-def cold(nmpc, theta):
-    return trace(nmpc.ocp, BUSY, theta)
+NMPC, THETA = paper.nmpc(solver=Riccati(starts=1)), np.array(paper.THETA_INIT)
 
 
 @pytest.mark.parametrize("state", [BUSY, [-2.5, 1.5, 0.0], [0.5, 1.5, 0.0]], ids=str)
 @pytest.mark.parametrize("factor", [1.0, 3.0])
-def test_the_last_iterate_is_the_solution_of_the_machine_code(nmpc, theta, state, factor):
+def test_the_last_iterate_is_the_solution_of_the_machine_code(state, factor):
     """In a scaled problem and inside an obstacle too."""
-    last_is_the_solution(nmpc, np.array(state), np.append(factor * theta[:8], theta[8]))
+    last_is_the_solution(NMPC, np.array(state), np.append(factor * THETA[:8], THETA[8]))
 
 
 def last_is_the_solution(nmpc, state, theta, data=None):
@@ -46,7 +32,8 @@ def last_is_the_solution(nmpc, state, theta, data=None):
     return solution, iterates
 
 
-def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance(cold):
+def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance():
+    cold = trace(NMPC.ocp, BUSY, THETA)
     assert (np.diff(cold.mu) <= 0).all()
     assert (cold.error >= cold.mu).all()
     assert (cold.error <= TOLERANCE).tolist() == [False] * (len(cold) - 1) + [True]
@@ -55,8 +42,8 @@ def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance(co
     assert cold.delta.iloc[-2] == 0
 
 
-def test_gauss_newton_needs_no_delta_and_more_iterations(nmpc, theta, cold):
-    straight = trace(nmpc.ocp, BUSY, theta, curvature=False)
+def test_gauss_newton_needs_no_delta_and_more_iterations():
+    cold, straight = (trace(NMPC.ocp, BUSY, THETA, curvature=how) for how in (True, False))
     assert straight.delta.max() == 0
     assert len(straight) > 3 * len(cold)
     if straight.error.iloc[-1] <= TOLERANCE:

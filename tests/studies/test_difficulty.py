@@ -50,7 +50,7 @@ def test_points_along_a_path_are_equally_far_apart_however_it_was_sampled():
     assert points[-1] == pytest.approx([1.0, 0.5])
 
 
-def test_a_path_beside_a_wall_has_its_distance_its_width_and_two_changes():
+def test_a_path_has_its_distance_and_width_beside_a_wall_and_between_discs_and_its_tortuosity():
     task = paper.task(((-2.0, 8.9),))  # far away
     found = barn(np.array([[3.0, -2.7], [3.0 + 1e-9, -2.7]]), task)
     assert found["closest"] == pytest.approx(0.3)
@@ -59,15 +59,9 @@ def test_a_path_beside_a_wall_has_its_distance_its_width_and_two_changes():
     assert found["dispersion"] == pytest.approx(2.0)
     # up and down are 12 m, as left and right; both diagonals end at the near wall and a side wall
     assert found["dimension"] == pytest.approx((0.3 + 6) * np.sqrt(2))
-
-
-def test_the_least_width_between_two_discs_is_their_distance():
     task = paper.task(((3.0, 1.0), (3.0, 5.0)))
     points = np.array([[3.0, 3.0], [3.0, 3.0 + 1e-9]])
     assert barn(points, task)["dimension"] == pytest.approx(4 - 2 * 1.25)
-
-
-def test_tortuosity_of_a_half_circle_is_half_of_pi():
     angle = np.linspace(0, np.pi, 2001)
     path = np.stack([3 + 4 * np.cos(angle), 3 + 4 * np.sin(angle)], axis=1)
     assert barn(path, TASK)["tortuosity"] == pytest.approx(np.pi / 2, rel=1e-5)

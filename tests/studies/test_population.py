@@ -126,12 +126,9 @@ def test_closing_gaps_is_confirmed_by_both_halves_only(measures):
     assert population.closing_gaps(measures, success | True).outcome == NOT
 
 
-def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
+def test_the_same_gap_closes_up_to_a_step_of_the_grid_and_a_cliff_costs_half():
     stops = pd.DataFrame({10: [0.2, 0.2, np.nan, 0.1], 20: [0.25, 0.4, 0.1, np.nan], 40: 0.2})
     assert population.gaps_and_horizon(stops).counts == {"layouts the same": (1, 3)}
-
-
-def test_a_cliff_is_where_a_little_more_theta_c_costs_half():
     answer = population.cliff(pd.Series({"A": 0.0, "B": 0.6, "C": 1.4, "D": 0.1}))
     assert (answer.counts, answer.numbers) == ({"layouts": (2, 4)}, {"most": 1.4})
 

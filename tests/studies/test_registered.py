@@ -9,14 +9,7 @@ import pandas as pd
 import pytest
 from history import INVESTIGATIONS, git, module
 
-from nmpcrl.studies import (
-    agents,
-    difficulty,
-    interventions,
-    population,
-    remedies,
-    worlds,
-)
+from nmpcrl.studies import agents, difficulty, interventions, population, remedies, worlds
 from nmpcrl.studies.population import POPULATION
 from nmpcrl.study import published
 

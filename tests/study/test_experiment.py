@@ -6,11 +6,9 @@ from itertools import count, product
 
 import numpy as np
 import pytest
-from builders import assert_same_numbers, raising
+from builders import assert_same_numbers
 
 from nmpcrl.control import Nmpc, SolverError
-from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.solvers import riccati
 from nmpcrl.learning.episode import Loop
 from nmpcrl.study import Experiment, ParameterError, paper, run
 from nmpcrl.study.design import FIELDS
@@ -108,33 +106,14 @@ def test_every_step_has_a_row_and_every_column_every_row(runs, learner):
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
-def test_the_columns_satisfy_the_papers_equations(runs, learner):
+def test_the_td_error_and_the_size_of_a_step_are_those_of_its_columns(runs, learner):
     s = runs[learner].steps
     delta = s["cost"] + 0.97 * s["next_value"] - s["value"]
     np.testing.assert_allclose(s["delta"], delta, rtol=1e-12)
     np.testing.assert_allclose(s["alpha_phi2"], 1e-7 * (s["features"] ** 2).sum(axis=1))
-    before = np.vstack([paper.THETA_INIT, s["theta"][:-1]])
-    if learner in ("ES", "DES", "RDES"):  # the semi-gradient
-        moved = np.nan_to_num(1e-7 * s["delta"])[:, None] * s["features"]
-        np.testing.assert_allclose(s["theta"], before + moved, rtol=1e-13)
-        assert (s["w"] == 1e-4).all()
-    if learner == "GES":  # gradient TD's second equation
-        before = np.vstack([np.full(9, 1e-4), s["w"][:-1]])
-        overlap = (s["features"] * before).sum(axis=1)
-        moved = 1e-8 * (s["delta"] - overlap)[:, None] * s["features"]
-        np.testing.assert_allclose(s["w"], before + moved, rtol=1e-12)
     if learner == "frozen":
         assert np.isnan(s["delta"]).all()
         assert (s["theta"] == paper.THETA_INIT).all()
-
-
-@pytest.mark.parametrize("learner", ["DES", "RDES"])
-def test_gated_learners_stand_still_for_127_steps(runs, learner):
-    s = runs[learner].steps
-    assert (s["theta"][:127] == paper.THETA_INIT).all()
-    assert (s["theta"][127] != paper.THETA_INIT).any()
-    for name in ("delta", "loss"):
-        assert np.flatnonzero(np.isfinite(s[name])).tolist() == [*range(127, 140)]
 
 
 def test_evaluations_come_first_every_so_often_and_last_and_each_episode_is_reported():
@@ -214,14 +193,3 @@ def test_a_theta_that_explodes_ends_the_run_and_is_not_evaluated(steps):
     assert "left the numbers" in records.facts["stopped"]
     assert len(records.steps["time"]) < 4 * steps
     assert (np.abs(records.evaluations["theta"]) <= 1e6).all()
-
-
-def test_the_facts_say_which_solver_found_the_plans(monkeypatch):
-    short = {"learner": "frozen", "episodes": 1, "steps": 3}
-    for name in ("riccati", "fatrop"):
-        assert run(Experiment(**short, solver=name)).facts["solver"] == name
-    monkeypatch.setattr(riccati, "load", raising(CannotCompile("no")))
-    with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
-        records = run(Experiment(**short))
-    assert records.experiment["solver"] == "riccati"
-    assert records.facts["solver"] == "fatrop"

@@ -43,14 +43,11 @@ def test_a_layout_meets_each_criterion_by_itself(centres, blocked, clear, arrive
     assert found.passed == (blocked and clear and arrives)
 
 
-def test_a_gap_between_two_obstacles_is_their_distance_less_what_plans_keep_of_each():
+def test_a_gap_is_crossed_between_obstacles_or_at_a_wall_and_is_as_wide_as_plans_leave_it():
     path = np.mean([FIRST, SECOND], axis=0) + [[-0.5, -0.75], [0.5, 0.75]]
     apart = np.linalg.norm(FIRST - SECOND)
     assert gaps(paper.task(), path, 0.0)[0, 1] == pytest.approx(apart - 2 * 1.25)
     assert gaps(paper.task(), path, 0.44)[0, 1] == pytest.approx(apart - 2 * 1.25 * 1.2)
-
-
-def test_a_gap_to_a_wall_is_crossed_below_an_obstacle_and_not_above_it_or_at_rest():
     below = SECOND + [[-1, -2.0], [1, -2.0]]
     assert gaps(paper.task(), below, 0.0)[1, -2] == pytest.approx(SECOND[1] + 3.0 - 1.25)
     assert (1, -2) not in gaps(paper.task(), below + [0, 4.0], 0.0)

@@ -66,12 +66,9 @@ def test_an_action_is_clipped_and_an_episode_stays_in_the_space_of_observations(
         np.testing.assert_array_equal(one, other)
 
 
-def acted(*actions, steps=5, reset=True):
-    env = RobotEnv("A", steps=steps)
-    if reset:
-        env.reset()
-    for action in actions:
-        env.step(action)
+def begun(env: RobotEnv) -> RobotEnv:
+    env.reset()
+    return env
 
 
 @pytest.mark.parametrize(
@@ -80,8 +77,12 @@ def acted(*actions, steps=5, reset=True):
         (lambda: RobotEnv("Z"), ParameterError, "layout = 'Z' must be one of A to F and T01 to"),
         (lambda: RobotEnv(steps=0), ParameterError, "steps = 0 must be"),
         (lambda: RobotEnv().reset(options={"layout": "1,1"}), ParameterError, "one of 4 obstacles"),
-        (lambda: acted([np.nan, 0.0]), ParameterError, "two finite numbers, speed and turn rate"),
-        (lambda: acted(FORWARD, reset=False), gymnasium.error.ResetNeeded, "call reset first"),
+        (
+            lambda: begun(RobotEnv("A")).step([np.nan, 0.0]),
+            ParameterError,
+            "two finite numbers, speed and turn rate",
+        ),
+        (lambda: RobotEnv("A").step(FORWARD), gymnasium.error.ResetNeeded, "call reset first"),
     ],
 )
 def test_nonsense_is_refused_in_a_sentence(call, error, message):

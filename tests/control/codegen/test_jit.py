@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -136,35 +136,21 @@ def test_what_cannot_be_imported_leaves_nothing(cache, capsys, text, error, word
     assert not [name for name in sys.modules if name.startswith("stopped_")]
 
 
-# Each makes a cache unfit, and returns the reason that is given.
-
-
-def below_a_file(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    cache.touch()
-    monkeypatch.setenv("NMPCRL_CACHE", str(cache / "below"))
-    return f"{cache / 'below'}: Not a directory"
-
-
-def read_only(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    may = os.access
-    monkeypatch.setattr(os, "access", lambda place, how: place != cache and may(place, how))
-    return f"{cache} cannot be written"
-
-
-def of_another_user(cache: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    users, user = iter([-1]), os.getuid()
-    monkeypatch.setattr(os, "getuid", lambda: next(users, user))
-    return f"{cache} belongs to another user"
-
-
-def open_to(cache: Path, mode: int) -> str:
-    cache.mkdir()
-    cache.chmod(mode)
-    return f"others may write to {cache}, which `chmod go-w` ends"
-
-
-def full(cache: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> str:
-    """A disk without room, as a step finds."""
+def made_unfit(cache: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> str:
+    """Make a cache unfit; the reason that is given."""
+    if kind == "below a file":
+        cache.touch()
+        monkeypatch.setenv("NMPCRL_CACHE", str(cache / "below"))
+        return f"{cache / 'below'}: Not a directory"
+    if kind == "of another user":
+        users, user = iter([-1]), os.getuid()
+        monkeypatch.setattr(os, "getuid", lambda: next(users, user))
+        return f"{cache} belongs to another user"
+    if kind == "open to all":
+        cache.mkdir()
+        cache.chmod(0o707)
+        return f"others may write to {cache}, which `chmod go-w` ends"
+    step = {"full": "write", "filled by numba": "import_package"}[kind]  # which finds no room
     does = getattr(folder, step)
 
     def fails(place: Path, *given: Any) -> Any:
@@ -176,19 +162,11 @@ def full(cache: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> str:
     return f"{cache}: No space left on device"
 
 
-UNFIT: dict[str, Callable[[Path, pytest.MonkeyPatch], str]] = {
-    "below a file": below_a_file,
-    "read-only": read_only,
-    "of another user": of_another_user,
-    "open to all": lambda cache, _: open_to(cache, 0o707),
-    "full": lambda *given: full(*given, "write"),
-    "filled by numba": lambda *given: full(*given, "import_package"),
-}
-
-
-@pytest.mark.parametrize("unfit", UNFIT.values(), ids=UNFIT)
-def test_what_an_unfit_folder_cannot_keep_a_temporary_one_does(cache, monkeypatch, capsys, unfit):
-    reason = unfit(cache, monkeypatch)
+@pytest.mark.parametrize(
+    "kind", ["below a file", "of another user", "open to all", "full", "filled by numba"]
+)
+def test_what_an_unfit_folder_cannot_keep_a_temporary_one_does(cache, monkeypatch, capsys, kind):
+    reason = made_unfit(cache, monkeypatch, kind)
     found = [jit.load(name, {"__init__": "x = 1\n"}) for name in ("first", "second")]
     assert capsys.readouterr().err == reason + ELSEWHERE
     (place,) = {Path(one.__file__).parent.parent for one in found}

@@ -17,16 +17,11 @@ START = np.array(paper.START)
 WARNING = "fatrop solves instead of riccati"
 
 
-@pytest.fixture
-def riccati(controllers) -> Nmpc:
-    """The paper's controller with the solver of this package."""
-    return controllers["riccati"]
-
-
 @pytest.mark.parametrize(
     "state", [(-3.05, 2.0, 0.0), (9.0, 9.4, 1.0), (50.0, 1.0, 0.0), (1e3, -1e3, 9)]
 )
-def test_from_outside_there_is_a_plan_that_says_how_far_it_leaves_the_box(riccati, state):
+def test_from_outside_there_is_a_plan_that_says_how_far_it_leaves_the_box(controllers, state):
+    riccati = controllers["riccati"]
     solution = riccati.solve(np.array(state), THETA)
     later, task = solution.states[1:], riccati.task
     beyond = np.maximum(later - task.upper, task.lower - later).max()
@@ -44,7 +39,8 @@ def limited(**limits: int) -> Nmpc:
     return paper.nmpc(solver=Riccati(code=lambda _: plain.find, starts=1))
 
 
-def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati):
+def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(controllers):
+    riccati = controllers["riccati"]
     other = THETA * np.linspace(0.5, 2, 9)
     warm_start, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
     assert (cold.restarts, cold.status) == (0, "solved")

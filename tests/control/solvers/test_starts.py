@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from nmpcrl.control import (
-    Nmpc,
-    Obstacle,
-    Problem,
-    Riccati,
-    Soft,
-    Task,
-    differential_drive,
-)
+from nmpcrl.control import Nmpc, Obstacle, Problem, Riccati, Soft, Task, differential_drive
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.control.solvers.starts import MOST
 from nmpcrl.study import paper

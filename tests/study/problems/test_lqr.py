@@ -8,19 +8,15 @@ from nmpcrl.study.problems import gros_zanon as gz
 from nmpcrl.study.problems import lqr, peers
 
 STATE = np.array([0.7, -1.1])
+NMPC = Nmpc(lqr.problem(), solver=Riccati(1e-11))
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-@pytest.fixture(scope="module")
-def nmpc() -> Nmpc:
-    return Nmpc(lqr.problem(), solver=Riccati(1e-11))
-
-
-def test_value_gradient_and_policys_sensitivity_are_those_of_riccatis_recursion(nmpc):
+def test_value_gradient_and_policys_sensitivity_are_those_of_riccatis_recursion():
     theta = lqr.problem().theta + 0.02 * np.random.default_rng(1).normal(size=16)
     theta = lqr.problem().names.filled(theta, {"R": [[0.4]]})
-    solution, step = nmpc.solve(STATE, theta), 1e-6
+    solution, step = NMPC.solve(STATE, theta), 1e-6
 
     def truth(values):
         found = lqr.planned(values)
@@ -33,12 +29,12 @@ def test_value_gradient_and_policys_sensitivity_are_those_of_riccatis_recursion(
     slopes = np.array([(up[0] - down[0]) / (2 * step) for up, down in sides])
     moves = np.array([(up[1] - down[1]) / (2 * step) for up, down in sides]).T
     np.testing.assert_allclose(solution.features, slopes, atol=1e-6)
-    np.testing.assert_allclose(nmpc.policy_jacobian(solution), moves, atol=1e-6)
+    np.testing.assert_allclose(NMPC.policy_jacobian(solution), moves, atol=1e-6)
 
 
-def test_an_informed_plan_has_the_best_policy_and_its_value_at_any_horizon(nmpc):
+def test_an_informed_plan_has_the_best_policy_and_its_value_at_any_horizon():
     best, theta = lqr.optimal(), lqr.problem(informed=True).theta
-    solution = nmpc.solve(STATE, theta)
+    solution = NMPC.solve(STATE, theta)
     assert solution.value == pytest.approx(STATE @ best.P @ STATE, rel=1e-9)
     np.testing.assert_allclose(solution.action, -best.K @ STATE, atol=1e-8)
 
@@ -70,9 +66,9 @@ def agent():
     return peers.agent(peers.end(plan, objective, "ipopt, 1e-10"), lqr.problem())
 
 
-def test_value_and_action_are_csnlps(nmpc, agent):
+def test_value_and_action_are_csnlps(agent):
     for state in np.random.default_rng(3).normal(size=(5, 2)):
-        solution = nmpc.solve(state, lqr.problem().theta)
+        solution = NMPC.solve(state, lqr.problem().theta)
         with peers.silent():
             action, theirs = agent.state_value(state, True)
         assert float(theirs.f) == pytest.approx(solution.value, rel=1e-7)
