@@ -59,7 +59,7 @@ test-site: .venv/ready  ## The built book in a browser; needs a built book and a
 test-tenth: .venv/ready  ## A tenth of the slow tests, another each day, or the one that TENTH=3 names
 	@$(PYTEST) -m "not (built or lab) and not ($(FAST))" --tenth $(TENTH)
 
-test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
+test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a built book and a Chromium
 	@$(BIN)/python -m pytest -m lab $(if $(ONLY),-k "$(ONLY)") tests/book/test_lab.py
 
 test-all: .venv/ready test-lab  ## All tests: an hour or two; needs a built book, a Chromium and a Firefox

@@ -191,3 +191,10 @@ def summary_of(
     facts["stopped"] = "finished" if reached is None else "diverged: theta"
     inputs = np.zeros((len(states), 2)) if actions is STILL else actions
     return RunSummary(asdict(experiment), episodes, evaluations, states, inputs, facts)
+
+
+def scaled(one: RunSummary, factor: float, which: Any = slice(None)) -> RunSummary:
+    """The same with other costs without noise."""
+    cost = one.evaluations["cost"].copy()
+    cost[which] *= factor
+    return replace(one, evaluations=one.evaluations | {"cost": cost})

@@ -17,14 +17,11 @@ def test_imports_run_one_way_and_a_foreign_library_has_one_home(monkeypatch, cap
     assert lint_imports(no_cache=True, no_logo=True) == 0, capsys.readouterr().out
 
 
-def test_control_and_learning_open_no_file():
+def test_control_and_learning_open_no_file_and_no_array_is_unpickled():
     """But for the cache of what numba compiled; what else knows the disk has to be imported."""
     paths = [*ROOT.glob("nmpcrl/control/**/*.py"), *ROOT.glob("nmpcrl/learning/**/*.py")]
     for path in paths:
         assert "codegen" in path.parts or not re.search(r"(?<![\w.])open\(", path.read_text()), path
-
-
-def test_no_array_is_unpickled():
     for path in MODULES:
         loads = re.findall(r"\bnp\.load\((.*)", path.read_text())
         assert all("allow_pickle=False" in one for one in loads), path

@@ -11,16 +11,13 @@ from nmpcrl.study.moving import Straight, World, controller, still
 THETA = np.array(paper.THETA_INIT)
 
 
-def test_states_inside_and_entries_are_counted_by_hand():
+def test_states_inside_are_counted_by_hand_and_a_rollout_is_judged_by_its_true_states():
     passing = [Straight((-2.0, 0.0), (5.0, 0.0))]  # 1 m a step: -2, -1, 0, 1, 2, 3
     states = np.zeros((6, 3))
     assert count(states, passing) == Contacts(inside=3, collisions=1)
     assert count(states, [Straight((0.0, 0.5))]) == Contacts(6, 1)  # entered at the start
     assert count(states, [*passing, Straight((-2.0, 0.0), (5.0, 0.0))]) == Contacts(3, 2)
     assert count(states, still([(3.0, 0.0)])) == Contacts(0, 0)
-
-
-def test_a_rollout_is_judged_by_its_true_states():
     world = World(still(paper.LAYOUTS["A"]), fault=FAULTS["noise"])
     one, same, other = (judged(controller(), THETA, world, seed) for seed in (1, 1, 2))
     assert one.cost == same.cost != other.cost

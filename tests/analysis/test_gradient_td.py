@@ -27,17 +27,13 @@ def test_samples_are_spread_over_the_run_and_the_ratio_is_dropped_over_printed(r
     assert (np.diff(measured.episode) >= 0).all()
 
 
-def test_the_printed_direction_is_the_one_that_theta_went(records, everywhere):
+def test_theta_went_the_printed_direction_and_the_dropped_term_is_the_hessian(records, everywhere):
     steps = records.steps
     went = np.diff(np.vstack([records.experiment["theta"], steps["theta"]]), axis=0) / paper.ALPHA
     lengths = np.linalg.norm(went, axis=1)[1:]
     assert len(everywhere.direction) == len(lengths)
     close = np.isclose(everywhere.direction, lengths, rtol=1e-3)
     assert close.mean() > 0.95  # a cold solve may find another optimum
-
-
-def test_the_dropped_term_is_the_hessian_by_differences(records, everywhere):
-    """h along one direction: the gradient of Q at theta + t w, differenced."""
     k, t = 60, 1e-4
     steps = records.steps
     theta, w, delta = steps["theta"][k - 1], steps["w"][k - 1], steps["delta"][k]

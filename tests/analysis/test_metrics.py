@@ -83,11 +83,8 @@ def test_the_cost_ratio_compares_medians_and_a_lost_episode_costs_infinitely_muc
     assert metrics.cost_ratio(cost, frozen) == pytest.approx(ratio, nan_ok=True)
 
 
-def test_overshooting_counts_the_steps_strictly_above_two():
+def test_steps_above_two_overshoot_and_neither_a_bound_nor_an_unknown_action_is_violated():
     assert metrics.overshooting(records(np.ones((1, 5)))) == pytest.approx(2 / 5)  # 0 1 2 3 4
-
-
-def test_neither_a_bound_nor_an_unknown_action_is_a_violation():
     actions = np.array([[1, 2], [-1, -2], [1.1, 0], [0, -2.1], [np.nan, np.nan]])
     found = metrics.out_of_bounds(actions, np.array([-1.0, -2.0]), np.array([1.0, 2.0]))
     assert found.tolist() == [False, False, True, True, False]

@@ -39,14 +39,11 @@ def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(away, heading, a
     assert describe(states, TASK, 0.5).arrival == pytest.approx(arrival)
 
 
-def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target():
+def test_coming_close_is_charged_within_the_margin_and_a_gap_closes_at_no_width():
     beside, within = [3.0, FAR + 0.01], [3.0, 1.25]
     assert describe(along(beside), TASK, 0.5).penalty == 0
     assert describe(along(beside, within), TASK, 0.5).penalty == pytest.approx(50 * 0.35)
     assert describe(along([8.5, 2.1]), NEAR, 0.5).penalty == 0
-
-
-def test_a_gap_closes_where_its_width_is_nothing():
     task, path = paper.task("A"), np.array([[5.5, 0.5], [7.5, 2.5]])
     shut = closes_at(task, path)
     assert min(gaps(task, path, shut).values()) == pytest.approx(0, abs=1e-12)

@@ -20,30 +20,24 @@ def model(**changed) -> Saving:
     return Saving(**{name: np.array(one) for name, one in (parts | changed).items()})
 
 
-def test_the_ratio_of_the_learners_breaks_even_where_it_says_and_comes_down_to_what_u_allows():
+def test_the_ratio_breaks_even_where_it_says_and_comes_down_to_what_u_allows():
     two = model()
     assert two.ratio(1e9) == pytest.approx(1 / 1.6)
     assert two.ratio(1e9, warm=1.0) == pytest.approx(0.5)
     assert two.ratio(two.break_even) == pytest.approx(1.0)
-
-
-def test_with_solves_that_take_alike_it_is_the_equation_without_u():
     same = model(warm=[1.0, 1.0], network=[0.2, 0.2], rest=[0.03, 0.03], rest_rdes=[0.05, 0.05])
     assert same.break_even == pytest.approx(0.22)
     assert same.break_even_within == pytest.approx((0.22, 0.22))
     assert (np.diff(same.ratio(np.geomspace(0.01, 1e3))) < 0).all()
 
 
-def test_the_break_even_lies_within_its_interval_whatever_way_leads_from_solver_to_solver():
+def test_the_break_even_lies_within_its_interval_and_none_is_beyond_two_solvers():
     low, high = model().break_even_within
     assert low < model().break_even < high
     assert (low, high) == pytest.approx((0.1 / 0.6, 0.22 / 0.4))
     for early in (True, False):  # all changes at the fast end, or at the slow one
         at = (0.051, 1.0) if early else (0.05, 0.999)
         assert low <= model(solve=np.array(at)).break_even <= high
-
-
-def test_a_break_even_that_is_not_between_two_solvers_is_none():
     slow = model(solve=[10.0, 100.0])
     assert slow.break_even < 10
     assert np.isnan(slow.break_even_within).all()

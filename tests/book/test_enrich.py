@@ -31,14 +31,11 @@ def test_an_anchor_before_an_equation_or_a_heading_is_a_paragraph_of_its_own(blo
     assert enrich.text('- item\n\n  <a id="a"></a>\n  $$') == '- item\n\n  <a id="a"></a>\n\n  $$'
 
 
-def test_tagged_cells_become_the_boxes_of_the_page():
+def test_tagged_cells_become_boxes_and_a_caption_moves_to_the_figure_before_it():
     (cell,) = dressed(tagged('<a id="ex-a"></a>\n**Exercise 1.1.** How?', "exercise"))
     assert cell.source == (
         '<div class="exercise">\n\n<a id="ex-a"></a>\n**Exercise 1.1.** How?\n\n</div>'
     )
-
-
-def test_a_caption_moves_to_the_figure_before_it():
     image = {"mystnb": {"image": {"alt": "dots"}}}
     (cell,) = dressed(
         new_code_cell("draw()", metadata=image),

@@ -26,15 +26,12 @@ def site(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_all_pages_become_one_whose_links_lead_within_it(site):
+def test_all_pages_become_one_for_paper_whose_links_lead_within_it(site):
     page = BeautifulSoup(pdf.joined(site), "html.parser")
     assert [one.get_text() for one in page.select("h1")] == ["one", "two"]
     targets = [link["href"] for link in page.select("a")]
     assert targets == ["#two--top", "#one--top", "two.ipynb", "#two--top", "#two--top", "two.ipynb"]
     assert all(page.find(id=one[1:]) for one in targets if one.startswith("#"))
-
-
-def test_what_is_folded_is_open_and_what_is_for_a_screen_is_gone(site):
     page = BeautifulSoup(pdf.joined(site), "html.parser")
     assert all(one.has_attr("open") for one in page.select("details"))
     assert not page.select("button, nav")

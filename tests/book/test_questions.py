@@ -128,7 +128,7 @@ def test_the_keyboard_alone_chooses_and_checks(tab):
     assert said(tab, "reason").inner_text() == "Right: it is b."
 
 
-def test_each_miss_opens_the_next_hint_and_says_so(tab):
+def test_each_miss_opens_the_next_hint_and_the_last_answer_of_each_exercise_is_kept(tab):
     opened = "[...document.querySelectorAll('details[open] summary')].map(one => one.innerText)"
     assert tab.evaluate(opened) == []
     assert "next hint is open" in answered(tab, "weight", "1")
@@ -136,9 +136,6 @@ def test_each_miss_opens_the_next_hint_and_says_so(tab):
     assert "next hint is open" in answered(tab, "weight", "1")
     assert tab.evaluate(opened) == ["Hint 1 of weight", "Hint 2 of weight"]
     assert "next hint" not in answered(tab, "weight", "1")
-
-
-def test_the_last_answer_of_each_exercise_is_kept(tab):
     answered(tab, "weight", "2.5")
     answered(tab, "many", "7")
     tab.reload()

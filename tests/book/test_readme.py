@@ -58,7 +58,7 @@ def test_the_halves_of_c1_are_those_of_the_published_verdict():
     assert counts == {"step": (of, des, rdes), "episode": (of, des_episode, rdes_episode)}
 
 
-def test_the_numbers_in_sentences_are_those_of_the_published_study():
+def test_numbers_in_sentences_and_the_commit_of_the_thresholds_are_the_published_ones():
     known, found = published.load(), finding(published.load())
     slow = "{:.2f} to {:.2f} at the paper's".format(*ratios_at_paper_speed(known.timings))
     kept = kept_without_noise(known.main.runs, BY_RUNS["C7"].learners).kept
@@ -75,9 +75,6 @@ def test_the_numbers_in_sentences_are_those_of_the_published_study():
         f" other {layouts - arrived} it costs {low} to {high} % more",
     ):
         assert said in TEXT
-
-
-def test_the_commit_of_the_thresholds_is_the_published_one():
     (commit,) = re.findall(r"fixed\s+in\s+commit\s+`(\w+)`", README)
     assert published.load().about["fixed"]["thresholds"]["hash"].startswith(commit)
 
@@ -110,12 +107,9 @@ def test_the_example_learns_what_the_text_says(capsys):
     assert "gain" in capsys.readouterr().out
 
 
-def test_the_way_of_imports_names_every_package():
+def test_the_way_of_imports_names_every_package_and_links_lead_to_files():
     rooms = {path.name for path in (ROOT / "nmpcrl").iterdir() if (path / "__init__.py").is_file()}
     (way,) = re.findall(r"`(\w+ -> [^`]+)`", README)
     assert set(re.findall(r"\w+", way)) == rooms
-
-
-def test_links_lead_to_files():
     for target in re.findall(r"\]\(([^):]+)\)", README):
         assert (ROOT / target).is_file(), target

@@ -22,7 +22,7 @@ def runs(*learners: str) -> pd.DataFrame:
     )
 
 
-def test_gaps_close_and_one_number_helps_as_the_geometry_and_the_rollouts_say(found):
+def test_gaps_close_one_number_helps_and_runs_arrive_as_geometry_and_rollouts_say(found):
     mine, saved, lost, closed = runs("ES", "GES"), {}, [], 0
     for layout in paper.LAYOUTS:
         task, nmpc, theta = paper.task(layout), paper.nmpc(layout), np.array(paper.THETA_INIT)
@@ -43,9 +43,6 @@ def test_gaps_close_and_one_number_helps_as_the_geometry_and_the_rollouts_say(fo
     assert found.saved_by_hand == pytest.approx(np.median(list(saved.values())))
     beaten = [saved[one] > mine.saved[mine.layout == one].max() for one in saved]
     assert found.better == (sum(beaten), len(beaten))
-
-
-def test_runs_that_arrive_end_at_the_target_and_cost_less(found):
     mine = runs("ES", "GES")
     good = (mine.ending == "arrived") & (mine.final_cost < mine.initial_cost)
     assert found.arrived_open[0] + found.arrived_closed[0] == good.sum()

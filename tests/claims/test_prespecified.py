@@ -42,13 +42,10 @@ def test_the_thresholds_are_those_of_the_named_commit_and_older_than_the_runs():
         assert date(one["hash"]) == one["date"]
 
 
-def test_each_later_decision_is_a_commit_of_that_date():
+def test_each_later_decision_is_a_commit_of_that_date_and_other_numbers_have_none(monkeypatch):
     later = decided_since()
     assert later.date.is_monotonic_increasing
     assert later.date.tolist() == [*map(date, later.commit)]
-
-
-def test_other_numbers_have_no_commit(monkeypatch):
     about = published.load().about
     assert fixed({}) == {}
     monkeypatch.setitem(prespecified.NUMBERS, "DIVERGED", 1.4)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import SOLVES, timings
+from builders import SOLVES, scaled, timings
 
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.search import Search, SearchResult
@@ -73,7 +73,7 @@ def forget() -> None:
         cached.cache_clear()
 
 
-def test_rows_and_curves_are_read_to_the_last_digit_and_in_order(known, summaries):
+def test_rows_curves_searches_times_and_their_origin_are_read_as_they_were(known, summaries):
     assert list(known.rows) == list(known.summaries) == list(RUNS)
     for e, one in summaries.items():
         labels = {"key": summary_key(e), "variant": LABELS[e], "source": "published"}
@@ -90,9 +90,6 @@ def test_rows_and_curves_are_read_to_the_last_digit_and_in_order(known, summarie
             assert there.shape == here.shape
             np.testing.assert_array_equal(there, here.astype(there.dtype))
     assert len(known.main.runs) == sum(label == "main" for label in LABELS.values())
-
-
-def test_searches_times_and_their_origin_are_read_as_they_were(known):
     assert known.searches == SEARCHES
     pd.testing.assert_frame_equal(known.timings, TIMES, check_dtype=False, check_exact=True)
     (batch,) = known.batches
@@ -173,10 +170,6 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
     )
     with pytest.raises(Unpublishable, match="is published already, in the part 'main'"):
         main_study.publish_runs(anew, main)
-
-
-def scaled(one, factor):
-    return replace(one, evaluations=one.evaluations | {"cost": factor * one.evaluations["cost"]})
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_answers_are_counted_by_level_in_order_of_appearance(drawn):
         assert one == Answers(yes, no, len(mine) - yes - no)
 
 
-def test_a_verdict_is_given_overall_in_each_layout_and_in_each_reading():
+def test_a_verdict_is_given_overall_and_in_each_layout_and_reading_if_there_are_any():
     asked = pd.concat([answers(A=[True] * 10, B=[False] * 10), answers("episode", A=[True] * 10)])
     verdict = settle(CLAIM, asked)
     assert verdict.outcome == PARTLY
@@ -86,9 +86,6 @@ def test_a_verdict_is_given_overall_in_each_layout_and_in_each_reading():
     assert verdict.share == 20 / 30
     assert verdict.interval == (rate(20, 30).low, rate(20, 30).high)
     assert verdict.levels == {"layout": 2, "decay": 2, "seed": 10}
-
-
-def test_a_study_with_other_levels_is_judged_overall():
     index = pd.MultiIndex.from_product([("end",), (0.5, 1.0), range(6)])
     asked = pd.Series(True, index.set_names(["learner", "ratio", "seed"]), dtype="boolean")
     verdict = settle(CLAIM, asked, unit="runs")

@@ -71,15 +71,12 @@ def test_a_number_that_a_function_reads_is_part_of_it_at_any_depth(monkeypatch):
     assert all(one != other for one, other in zip(found, later, strict=True))
 
 
-def test_names_and_comments_change_nothing_and_a_function_may_call_itself():
+def test_names_and_comments_change_nothing_and_an_environment_is_its_specification():
     one = functions("def f(x):\n    return x + 1")["f"]
     other = functions("# moved\n\ndef g(x):  # a comment\n    return x + 1")["g"]
     assert content(one) == content(other)
     text = "def f(n):\n    return n and f(n - 1)"
     assert content(functions(text)["f"]) == content(functions(text)["f"])
-
-
-def test_an_environment_of_gymnasium_is_its_specification():
     one, other = (gymnasium.make("Pendulum-v1", g=g) for g in (9.81, 3.7))
     assert content(one) == content(gymnasium.make("Pendulum-v1", g=9.81)) != content(other)
     assert content(pickle.loads(pickle.dumps(one))) == content(one)

@@ -99,7 +99,7 @@ def test_a_copy_another_layout_horizon_or_discount_takes_no_other_machine_code()
         assert len({stages.write(problem) for problem in problems}) == 1
 
 
-def test_a_key_says_what_a_user_wrote():
+def test_a_key_says_what_a_user_wrote_and_any_other_number_or_name_is_another_key():
     """With all that his code reads, and not where it stands."""
     one, again = (rewritten(Nmpc, "solve", 1)(limited()) for _ in range(2))
     assert one.key == again.key == pickle.loads(cloudpickle.dumps(one)).key
@@ -111,9 +111,6 @@ def test_a_key_says_what_a_user_wrote():
     plain.solve = np.random.default_rng(0)
     with pytest.raises(NoContent, match="a Generator"):
         _ = plain.key
-
-
-def test_a_key_is_that_of_the_content_and_any_other_number_or_name_is_another_key():
     assert Nmpc(limited()).key == Nmpc(limited()).key
     assert len(Nmpc(limited()).key) == 64
     assert plant().key == plant().key

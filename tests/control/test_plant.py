@@ -24,7 +24,7 @@ def test_runge_kutta_is_the_exponentials_series_up_to_the_fourth_power():
     np.testing.assert_allclose(growth.step([1.0, -2.0], [0.8]), [series, -2 * series])
 
 
-def test_a_step_is_a_fifth_of_a_second_on_an_arc_a_line_or_a_parabola():
+def test_a_step_is_a_fifth_of_a_second_on_an_arc_a_line_or_a_parabola_and_inputs_are_clipped():
     state, action = np.array([1.0, 2.0, -0.7]), np.array([0.5, -1.0])
     stepped = differential_drive().step(state, action)
     np.testing.assert_allclose(stepped, arc(state, *action, 0.2), atol=1e-6)
@@ -33,9 +33,6 @@ def test_a_step_is_a_fifth_of_a_second_on_an_arc_a_line_or_a_parabola():
     state, push = np.array([1.0, 2.0, 3.0, -1.0]), np.array([0.5, 2.0])
     exact = [*(state[:2] + 0.2 * state[2:] + 0.2**2 / 2 * push), *(state[2:] + 0.2 * push)]
     np.testing.assert_allclose(point_mass().step(state, push), exact, atol=1e-14)
-
-
-def test_an_action_is_clipped_to_the_action_space():
     robot = differential_drive()
     np.testing.assert_array_equal(robot.clip(np.array([1.6, -0.1])), [0.6, -0.1])
     np.testing.assert_array_equal(robot.clip(np.array([-9.0, 9.0])), [-0.6, np.pi / 2])

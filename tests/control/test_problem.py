@@ -13,7 +13,7 @@ from nmpcrl.control import Nmpc
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-def test_theta_and_its_gradient_have_names():
+def test_theta_and_its_gradient_have_names_and_data_are_given_once_or_stage_by_stage():
     problem = pendulum()
     solution = Nmpc(problem).solve(np.array([0.4, 0.1]), problem.theta)
     by_name = problem.split(solution.features)
@@ -30,9 +30,6 @@ def test_theta_and_its_gradient_have_names():
         problem.vector(q=1.0)
     with pytest.raises(ValueError, match=r"theta 'Q' has shape \(4,\); it must be \(2, 2\)"):
         problem.vector(Q=np.ones(4))
-
-
-def test_data_are_given_once_or_stage_by_stage():
     nmpc, state = Nmpc(pendulum()), np.array([0.3, -0.2])
 
     def value(**data):

@@ -8,7 +8,7 @@ from small_problems import pendulum
 from nmpcrl.control import Problem, Soft
 
 
-def test_step_and_cost_are_the_functions_of_the_problem_with_numbers():
+def test_step_cost_and_plant_are_the_functions_of_the_problem_with_numbers():
     """The pendulum by NumPy; its last soft rows hold at stage N alone, and cost nothing."""
     problem, rng = pendulum(), np.random.default_rng(0)
     for _ in range(200):
@@ -22,9 +22,6 @@ def test_step_and_cost_are_the_functions_of_the_problem_with_numbers():
         cost += 4 * max(rows[0], 0) + 2 * max(rows[1], 0)
         assert problem.step(x, u, theta, data=data) == pytest.approx(later, rel=1e-13, abs=1e-13)
         assert problem.cost(x, u, theta, data=data) == pytest.approx(cost, rel=1e-13)
-
-
-def test_a_plant_moves_with_its_own_parameters_at_the_cost_of_the_plan():
     problem, x, u = pendulum(), [0.3, 0.9], [0.5]
     later, cost, end = problem.plant(rate=1.7)(np.array(x), np.array(u), None)
     assert later.tolist() == problem.step(x, u, problem.vector(rate=1.7)).tolist()

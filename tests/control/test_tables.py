@@ -26,15 +26,12 @@ def heater(table, **parameters) -> Problem:
     )  # fmt: skip
 
 
-def test_a_plan_through_a_learned_table_has_all_its_derivatives():
+def test_a_learned_table_has_all_derivatives_and_casadis_interpolant_is_fatrops():
     problem = heater(lambda x, th: ca.pw_lin(x, POINTS, th["losses"]), losses=LOSSES)
     riccati, ipopt = (Nmpc(problem, solver=how) for how in (Riccati(1e-11), Ipopt(1e-10)))
     ours, theirs = (one.solve(STATE, problem.theta) for one in (riccati, ipopt))
     assert ours.value == pytest.approx(theirs.value, abs=1e-6)
     assert agrees(riccati, ours, 1e-4)
-
-
-def test_casadis_interpolant_is_solved_by_fatrop_and_said_not_to_compile():
     table = ca.interpolant("table", "linear", [POINTS], LOSSES)
     problem = heater(lambda x, th: table(x))
     with pytest.warns(UserWarning, match=r"write ca.pw_lin\(x, .*\): fatrop solves instead"):

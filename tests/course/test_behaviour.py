@@ -77,7 +77,7 @@ def test_an_object_that_is_equal_to_everything_is_not_right(right):
         function(lambda x: alike, lambda x: right, lambda rng: {"x": rng.normal()})
 
 
-def test_a_known_mistake_that_shows_in_one_case_of_a_hundred_is_always_met():
+def test_a_mistake_that_seldom_shows_or_seldom_differs_from_another_has_its_sentence():
     def above(x: float) -> bool:
         return x > 0.99
 
@@ -89,9 +89,6 @@ def test_a_known_mistake_that_shows_in_one_case_of_a_hundred_is_always_met():
                 lambda rng: {"x": float(rng.uniform())},
                 mistakes={"Some are above.": lambda x: False},
             )
-
-
-def test_of_two_mistakes_that_seldom_differ_each_has_its_sentence():
     mistakes = {"Over half.": lambda x: x > 0.5, "A little more.": lambda x: x > 0.51}
     for why, wrong in [*mistakes.items()] * 20:
         with pytest.raises(Unsolved, match=why):

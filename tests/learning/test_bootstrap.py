@@ -95,16 +95,15 @@ def taught():
     return QNetwork(5, np.random.default_rng(0), batch=1)
 
 
-def test_a_lagged_copy_predicts_and_is_refreshed_after_so_many_steps(transition):
+def test_a_lagged_copy_is_refreshed_after_some_steps_and_an_averaged_one_goes_a_part_each(
+    transition,
+):
     network, found, present = taught(), [], []
     lagged = Imitation(network, with_theta=False, target=Target(network, every=3))
     for _ in range(8):
         found += values(lagged, transition(THETA), 1)
         present.append(float(network.predict(np.array(NEXT))))
     assert found == [None, None, *[present[2]] * 3, *[present[5]] * 3]
-
-
-def test_an_averaged_copy_goes_a_part_of_the_way_at_each_step(transition):
     network = taught()
     target, average = Target(network, rate=0.1), network.weights.copy()
     averaged = Imitation(network, with_theta=False, target=target)

@@ -147,7 +147,7 @@ def test_the_next_state_is_valued_with_the_data_of_the_next_time(tank, constrain
         assert step.solution.data[0, 0] == PRICES[step.time]
 
 
-def test_a_plant_may_write_into_its_arguments_and_return_one_array_for_ever(tank):
+def test_a_plant_may_write_into_its_arguments_and_draws_nothing_that_others_draw(tank):
     mine = np.zeros(1)
 
     def in_place(state, action, rng):
@@ -171,9 +171,6 @@ def test_a_plant_may_write_into_its_arguments_and_return_one_array_for_ever(tank
         found.append((moved, rollout.states.tolist(), rollout.actions.tolist()))
         assert start == [0.3]
     assert found[0] == found[1] == found[2]
-
-
-def test_a_plant_draws_neither_the_noise_of_the_same_int_nor_what_rollouts_draw(tank):
     drawn = []
 
     def plant(state, action, rng):

@@ -9,22 +9,10 @@ from builders import raising
 from learning.small_runs import THETA
 from numba import njit
 
+from nmpcrl import learning
 from nmpcrl.control import Riccati, SolverError, differential_drive
 from nmpcrl.control.solvers import riccati
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.learning import (
-    Diverged,
-    Exploration,
-    Weights,
-    count_episodes,
-    count_steps,
-    expected_sarsa,
-    frozen,
-    gradient_expected_sarsa,
-    gradient_tdc,
-    q_learning,
-    train,
-)
 from nmpcrl.learning.episode import NUMBERS, Loop, _row, episodes
 from nmpcrl.learning.loop import FIND, SLOPES
 from nmpcrl.learning.remedies import guarded
@@ -45,29 +33,29 @@ def imitating(kind, **fields):
     return make
 
 
-TDC = partial(gradient_tdc, alpha=paper.ALPHA, beta=paper.BETA_TDC)
+TDC = partial(learning.gradient_tdc, alpha=paper.ALPHA, beta=paper.BETA_TDC)
 MAKE = {
-    "ES": partial(expected_sarsa, alpha=3 * paper.ALPHA),
-    "GES": partial(gradient_expected_sarsa, alpha=paper.ALPHA, beta=paper.BETA),
+    "ES": partial(learning.expected_sarsa, alpha=3 * paper.ALPHA),
+    "GES": partial(learning.gradient_expected_sarsa, alpha=paper.ALPHA, beta=paper.BETA),
     "TDC": partial(TDC, projection=paper.THETA_SET),
     "TDC without curvature": partial(TDC, curvature=False),
-    "QL": partial(q_learning, alpha=paper.ALPHA),
+    "QL": partial(learning.q_learning, alpha=paper.ALPHA),
     "DES": imitating("DES"),
     "RDES": imitating("RDES"),
     "RDES literal": imitating("RDES", gated=False),
-    "frozen": frozen,
+    "frozen": learning.frozen,
 }
 READINGS = [name for name in NETWORKS if name not in ("plain", "greedy")]
 OPTIONS = [{}, {"constrained": True}, {"constrained": False, "clipped": False}]
 LIMIT, COLD = float(End.LIMIT), int(Start.COLD)
 
 
-def noise(count=count_steps, steps=STEPS):
-    return Exploration.draw(np.random.default_rng(1), (EPISODES, steps, 2), count=count)
+def noise(count=learning.count_steps, steps=STEPS):
+    return learning.Exploration.draw(np.random.default_rng(1), (EPISODES, steps, 2), count=count)
 
 
 def weights():
-    return Weights(THETA, np.full(9, paper.W_INIT))
+    return learning.Weights(THETA, np.full(9, paper.W_INIT))
 
 
 def rows_and_ends(made, rows_of):
@@ -78,7 +66,7 @@ def rows_and_ends(made, rows_of):
             rows.append(rows_of(part))
             if getattr(part, "last", True):
                 failures.append(part.failure)
-    except Diverged as error:
+    except learning.Diverged as error:
         stopped = str(error)
     return np.vstack(rows), failures, stopped
 
@@ -87,7 +75,7 @@ def assert_same(make, nmpc, explore=None, looped=True, **options):
     """Compare rows and ends of the loop and of the generator; return the columns."""
     given = nmpc, weights(), explore or noise()
     assert (Loop.of(Trainer(make(nmpc), *given, **options)) is not None) == looped
-    expected, failures, stopped = rows_and_ends(train(make(nmpc), *given, **options), _row)
+    expected, failures, stopped = rows_and_ends(learning.train(make(nmpc), *given, **options), _row)
     made, columns = [], {}
 
     def rows_of(episode):
@@ -122,7 +110,7 @@ def test_noise_may_decay_by_episodes_and_a_start_may_be_drawn(robot):
     def start(rng):
         return np.array(paper.START) + rng.uniform(0, 0.3, 3)
 
-    columns = assert_same(MAKE["GES"], robot, noise(count_episodes), start=start, rng=4)
+    columns = assert_same(MAKE["GES"], robot, noise(learning.count_episodes), start=start, rng=4)
     assert len(np.unique(columns["state"][::STEPS, 0])) == EPISODES
 
 
@@ -186,12 +174,12 @@ def test_a_plant_that_runs_away_ends_the_episode_in_both(robot):
 @pytest.mark.parametrize(
     ("make", "what"),
     [
-        (partial(expected_sarsa, alpha=1.0), "theta"),
-        (partial(gradient_expected_sarsa, alpha=1e-9, beta=1.0), "w"),
+        (partial(learning.expected_sarsa, alpha=1.0), "theta"),
+        (partial(learning.gradient_expected_sarsa, alpha=1e-9, beta=1.0), "w"),
     ],
 )
 def test_weights_that_leave_all_numbers_are_a_divergence_in_both(robot, make, what):
-    with pytest.raises(Diverged, match=f"^{what} = .* left the numbers"):
+    with pytest.raises(learning.Diverged, match=f"^{what} = .* left the numbers"):
         list(episodes(make(robot), robot, weights(), noise()))
     assert_same(make, robot)
 
@@ -199,15 +187,17 @@ def test_weights_that_leave_all_numbers_are_a_divergence_in_both(robot, make, wh
 @pytest.mark.parametrize(
     "change",
     [
-        lambda nmpc: {"make": lambda n: replace(frozen(n), gamma=0.5)},
+        lambda nmpc: {"make": lambda n: replace(learning.frozen(n), gamma=0.5)},
         lambda nmpc: {"plant": lambda s, a, _: (nmpc.plant.step(s, a), 1.0, False)},
         lambda nmpc: {"nmpc": paper.nmpc(solver="fatrop")},
-        lambda nmpc: {"make": lambda n: guarded(gradient_expected_sarsa(n, 1e-6, 1e-7), 1e-6)},
+        lambda nmpc: {
+            "make": lambda n: guarded(learning.gradient_expected_sarsa(n, 1e-6, 1e-7), 1e-6)
+        },
         lambda nmpc: {"make": imitating("RDES", network="greedy", gated=False)},
     ],
     ids=["gamma", "plant", "solver", "rule", "greedy"],
 )
 def test_parts_that_the_loop_does_not_know_take_the_generator(robot, change):
-    changed = {"make": frozen, "nmpc": robot, "explore": noise(steps=3)} | change(robot)
+    changed = {"make": learning.frozen, "nmpc": robot, "explore": noise(steps=3)} | change(robot)
     columns = assert_same(**changed, looped=False)
     assert len(columns["cost"]) == EPISODES * 3

@@ -51,7 +51,7 @@ def trained(nmpc, plant, rng=0, shape=(3, 10)):
     return run(expected_sarsa(nmpc, 1e-7), nmpc, explore, plant=plant, rng=rng)
 
 
-def test_a_gymnasium_environment_is_a_plant_that_is_truncated_or_terminated(car):
+def test_a_gymnasium_environment_is_a_plant_that_ends_and_whose_seeds_the_generator_draws(car):
     steps = trained(car, Slow(), shape=(10, 10))
     for step, later in pairwise(steps):
         if not step.last:
@@ -62,9 +62,6 @@ def test_a_gymnasium_environment_is_a_plant_that_is_truncated_or_terminated(car)
     for step in ends:
         assert step.end or step.time == 5
         assert (step.update.successor.value == 0) == step.end
-
-
-def test_the_seeds_of_an_environment_come_from_the_generator(car):
     first, again, other = ([s.state for s in trained(car, Slow(), rng=rng)] for rng in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first[0], other[0])

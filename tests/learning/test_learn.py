@@ -143,13 +143,10 @@ def test_confirming_rollouts_are_those_of_evaluate_and_undo_goes_back_to_the_bes
     assert undone.costs[best] == pytest.approx(evaluate(nmpc, undone.vector, **how).cost)
 
 
-def test_a_callback_ends_learning(nmpc):
+def test_a_callback_ends_learning_and_noise_of_fewer_episodes_is_the_same(nmpc):
     result = learn(nmpc, episodes=9, steps=2, callback=lambda e: e.number < 2, **WORLD)
     assert result.episodes == 3
     assert len(result.history["cost"]) == 6
-
-
-def test_noise_of_fewer_episodes_is_the_same_and_has_the_deviation_that_was_asked_for():
     all_of_it = Exploration(episodes=40, steps=500, deviation=[0.1, 2.0], seed=1)
     assert all_of_it.scaled.std(axis=(0, 1)) == pytest.approx([0.1, 2.0], rel=0.02)
     half = Exploration(episodes=20, steps=500, deviation=[0.1, 2.0], seed=1, first=20)

@@ -111,15 +111,12 @@ def test_seeds_decide_every_bit_and_a_memory_that_is_not_full_none():
     assert one == same == limited != other
 
 
-def test_it_predicts_one_input_or_many_and_learns_nothing_from_it():
+def test_it_predicts_one_input_or_many_and_scales_are_as_if_the_caller_had_divided():
     learner, (inputs, _) = network(), rows(15)
     many, one = learner.predict(inputs.reshape(3, 5, 2)), learner.predict(inputs[0])
     assert (many.shape, one.shape) == ((3, 5), ())
     assert float(one) == pytest.approx(many[0, 0], rel=1e-6)
     np.testing.assert_array_equal(learner.predict(inputs.reshape(3, 5, 2)), many)
-
-
-def test_scales_are_as_if_the_caller_had_divided():
     inputs, targets = rows(200)
     input_scale, target_scale = SCALED["scales"]
     scaled = taught((inputs, targets), **SCALED)

@@ -46,7 +46,7 @@ def places(steps):
     return [(step.episode, step.time) for step in steps]
 
 
-def test_steps_are_those_of_algorithm_1(robot):
+def test_steps_are_those_of_algorithm_1_and_without_clipping_an_action_is_the_wish(robot):
     plant, task, weights, clipped = robot.plant, robot.task, Weights(THETA), 0
     explore = Exploration(noise(2, 5).noise, np.full((2, 5), 0.7))
     steps = run(es(robot), robot, explore)
@@ -66,9 +66,6 @@ def test_steps_are_those_of_algorithm_1(robot):
         weights = step.weights
     assert clipped > 0
     assert not np.array_equal(weights.theta, THETA)
-
-
-def test_an_action_that_is_not_clipped_is_the_wish_and_frozen_weights_never_move(robot):
     explore = noise(1, 8)
     steps = run(frozen(robot), robot, explore, clipped=False)
     for step in steps:

@@ -246,14 +246,11 @@ def test_the_map_has_a_frame_and_an_arrow_for_every_change(made_up):
     assert len(frames) == len(arrows) == rows.changes.sum() > 0
 
 
-def test_thresholds_are_drawn_where_they_were_fixed(made_up):
+def test_thresholds_are_drawn_where_they_were_fixed_and_a_verdict_is_kept_between_two(made_up):
     found = made_up()
     values = {claim: one.measure(found.runs, found.paths) for claim, one in BY_RUNS.items()}
     for panel, claim in zip(layouts.borders(values, "").axes, BY_RUNS.values(), strict=False):
         assert any(list(line.get_xdata()) == [claim.threshold] * 2 for line in panel.get_lines())
-
-
-def test_a_claim_keeps_its_verdict_between_the_thresholds_named():
     outcome = ["no", "no", "yes", "yes", "yes", "no", "yes"]
     curve = pd.DataFrame({"border": np.arange(1.0, 8.0), "outcome": outcome})
     assert layouts.same_verdict(curve, 4.0) == (3.0, 5.0)

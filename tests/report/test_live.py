@@ -114,7 +114,7 @@ def test_the_introduction_trains_as_the_study_where_a_gap_is_open_and_where_one_
     assert layouts.screen(paper.LAYOUTS[NARROW]).kind == "closing"
 
 
-def test_the_laboratory_allows_what_an_experiment_takes():
+def test_the_laboratory_allows_what_an_experiment_takes_and_its_text_closes_a_gap():
     for field in given("laboratory")["fields"]:
         name = field["name"]
         assert field["default"] == getattr(Experiment(), name)
@@ -129,9 +129,6 @@ def test_the_laboratory_allows_what_an_experiment_takes():
             with pytest.raises(ParameterError):
                 Experiment(**{name: kind(one)})
     assert setting("zeta")["read_by"] == ["DES", "RDES"]
-
-
-def test_the_text_of_the_laboratory_sets_theta_c_to_either_side_of_where_the_gap_closes():
     page = (frame.ROOT / "book/laboratory.ipynb").read_text()
     values = [float(one) for one in re.findall(r"theta=[\d.,]*,([\d.]+)", page)]
     (centres,) = set(re.findall(r"#layout=([-\d.,;]+)", page))

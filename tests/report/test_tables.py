@@ -165,7 +165,7 @@ ADVICE = pd.DataFrame(
 )
 
 
-def test_a_method_has_its_word_its_evidence_and_its_price_by_budget():
+def test_a_method_has_its_word_its_evidence_and_its_price_by_budget_the_smaller_first():
     head, first, last = cells(remedies.advice_table(ADVICE, "All."))
     assert len(head) == len(first) == len(last)
     assert first[0] == "`CMA-ES|[spread=0.1]`"
@@ -174,9 +174,6 @@ def test_a_method_has_its_word_its_evidence_and_its_price_by_budget():
     assert first[3].startswith("0.99 [0.98, 1.00]|")
     assert last[2].startswith("-∞ [-∞, -0.20]|")
     assert last[3] == "–"
-
-
-def test_the_evidence_of_a_method_is_that_with_the_smaller_budget():
     found = remedies.evidence(ADVICE, "CMA-ES")
     assert f"{found['gain'].value:.2f}" == "0.80 [0.70, 0.90]"
     assert found["solved"].value.value == pytest.approx(0.9)

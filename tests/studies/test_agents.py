@@ -124,13 +124,10 @@ def test_an_agent_is_judged_with_the_setting_that_costs_least_and_not_before_it_
         tuned(pd.DataFrame(tuning[1:]), "SAC")
 
 
-def test_the_published_settings_are_those_of_the_published_tuning():
+def test_settings_are_the_published_tuning_s_and_one_agent_for_all_meets_new_layouts():
     table = SAC_AND_TD3.table()
     for part in PARTS:
         assert {*PARTS[part].settings(table)} == {*table[table.part == part].arm}
-
-
-def test_one_agent_for_all_is_judged_in_layouts_that_it_never_saw():
     assert {*trained_in(EVERY)} == {*TUNE}
     assert {*judged_in(EVERY)} == {*TUNE, *JUDGE}
     assert {*judged_in("J001")} == {*trained_in("J001")} == {"J001"}

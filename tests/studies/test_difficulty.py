@@ -91,12 +91,9 @@ def test_auc_counts_pairs_and_is_unknown_of_one_kind(layouts):
     assert np.isnan(found) if not pairs else found == pytest.approx(np.mean(pairs))
 
 
-def test_brier_of_a_certain_and_right_prediction_is_0_and_of_a_coin_a_quarter():
+def test_brier_by_hand_and_a_fit_without_a_slope_left_in_its_loss():
     assert brier(np.array([1.0, 0.0]), np.array([True, False])) == 0
     assert brier(np.array([0.5, 0.5]), np.array([True, False])) == 0.25
-
-
-def test_a_fit_has_no_slope_left_in_its_loss():
     rng = np.random.default_rng(0)
     x = rng.normal(size=40)
     y = rng.random(40) < 1 / (1 + np.exp(-2 * x))

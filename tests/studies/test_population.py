@@ -58,7 +58,7 @@ def drawn():
     return population.load()
 
 
-def test_each_run_has_its_frozen_arm_and_a_counterpart_among_the_judged():
+def test_each_run_has_its_counterparts_and_a_claim_holds_where_most_answers_are_yes():
     plan = {part: population.experiments(pd.DataFrame([*POPULATION.conditions(part)]))
             for part in PARTS}  # fmt: skip
     every = {e for runs in plan.values() for e in runs}
@@ -71,9 +71,6 @@ def test_each_run_has_its_frozen_arm_and_a_counterpart_among_the_judged():
     assert {(one.learner, one.layout, one.decay, one.seed) for one in others} <= cells
     seeds = [seed_of(name, k) for name in LAYOUTS for k in (0, 1)]
     assert len({*seeds}) == len(seeds)
-
-
-def test_a_claim_holds_in_a_layout_where_more_than_half_of_its_answers_are_yes():
     cells = [("J001", "step", True), ("J001", "episode", False)]
     cells += [("J002", "step", True), ("J002", "episode", True)]
     rows = [made("judge", "ES", name, decay=decay, better=yes) for name, decay, yes in cells]

@@ -94,16 +94,13 @@ def _defined(tree, name):
     raise AssertionError(name)
 
 
-def test_settings_and_parts_of_agents_are_those_registered():
+def test_settings_and_parts_of_agents_remedies_and_worlds_are_those_registered():
     then = module("2feab64", "nmpcrl.claims.agent_questions")
     assert (agents.SETTINGS, agents.SPARING) == (then.SETTINGS, then.SPARING)
     for name, old in then.PARTS.items():
         now = agents.PARTS[name]
         assert (now.places, now.seeds, now.episodes) == (old.places, old.seeds, old.budget)
         assert agents.CHECKPOINTS[name] == old.checkpoints
-
-
-def test_settings_parts_and_advice_of_remedies_are_those_registered():
     then = module("ebf53a4", "nmpcrl.claims.remedy_questions")
     for name in ("SETTINGS", "ADVICE", "EXPECTED_FIRST"):
         assert [*getattr(remedies, name).items()] == [*getattr(then, name).items()]
@@ -115,9 +112,6 @@ def test_settings_parts_and_advice_of_remedies_are_those_registered():
         for entry in remedies.SETTINGS:
             runs = [(layout, k) for layout in old.layouts_of(entry) for k in range(old.seeds)]
             assert all(now.order(arm) == runs for arm in remedies.arms(entry))
-
-
-def test_parts_of_worlds_are_those_registered():
     then = module("cff09a0", "nmpcrl.claims.world_questions").PARTS
     then |= {"terminal": module("ff05118", "nmpcrl.claims.terminal_questions").TERMINAL}
     assert [*then] == [*worlds.PARTS]

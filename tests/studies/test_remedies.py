@@ -95,12 +95,9 @@ def test_advice_follows_its_rule(blocks, expected):
     assert [*dict(zip(found.entry, found.word, strict=True)).items()] == expected
 
 
-def test_without_runs_no_question_is_decided():
+def test_every_entry_is_compared_from_its_default_and_without_runs_nothing_is_decided():
     found = REMEDIES.answers(table(*block("frozen")))
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
-
-
-def test_every_entry_is_compared_and_begins_its_tuning_with_its_default():
     assert [*remedies.SETTINGS] == [*ENTRIES]
     for entry, settings in remedies.SETTINGS.items():
         assert bool(settings) == bool(ENTRIES[entry].defaults)

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pandas as pd
 import pytest
-from builders import timings
+from builders import scaled, timings
 
 from nmpcrl.analysis import summaries
 from nmpcrl.claims.published import Evidence, Published
@@ -45,12 +45,6 @@ def study(made_up):
         return dict(made_up(lambda e: ends.get(e, {}), layouts=("A",)).summaries)
 
     return make
-
-
-def scaled(one, factor, which=slice(None)):
-    cost = one.evaluations["cost"].copy()
-    cost[which] *= factor
-    return replace(one, evaluations=one.evaluations | {"cost": cost})
 
 
 def moved(one):
@@ -100,7 +94,7 @@ def test_elsewhere_most_runs_must_lie_in_the_published_range(
     assert wrong.what.tolist() == ["final_cost"] * contradicts
 
 
-def test_elsewhere_the_cost_of_theta_init_must_agree_in_runs_of_the_same_fields(study):
+def test_elsewhere_the_cost_of_theta_init_must_agree_and_here_a_batch_is_comparable(study):
     found, other = study(), Experiment(horizon=5)
     edited = {Experiment(): scaled(found[Experiment()], 1 + 1e-4, 0)}
     assert compare(edited, published_of(found, ELSEWHERE)).what.tolist() == ["initial_cost"]
@@ -111,9 +105,6 @@ def test_elsewhere_the_cost_of_theta_init_must_agree_in_runs_of_the_same_fields(
     assert compare({other: variant}, known).empty
     as_main = replace(found[Experiment()], experiment=asdict(other))
     assert "initial_cost" in set(compare({other: as_main}, known).what)
-
-
-def test_a_batch_is_comparable_where_this_machine_made_it(study):
     known = published_of(study(), ELSEWHERE)
     more, *rest = known.rows
     known = with_part(known, more, "alpha x 3")

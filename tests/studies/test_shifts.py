@@ -52,14 +52,11 @@ def network_of(examples):
     return network, shifts.Recent(copy(network), RNG(0))
 
 
-def test_a_replay_that_prefers_what_is_late_draws_no_example_twice():
+def test_a_late_replay_draws_no_example_twice_and_fits_what_is_late_if_there_is_a_choice():
     _, late = network_of(20_000)
     drawn = np.array([late.draw() for _ in range(200)])
     assert all(len({*row}) == 128 for row in drawn.tolist())
     assert (19_999 - drawn).mean() == pytest.approx(shifts.AGE, rel=0.15)
-
-
-def test_a_late_replay_fits_what_a_uniform_one_does_where_there_is_one_batch_and_late_ones_else():
     network, late = network_of(128)
     assert [late.fit() for _ in range(5)] == pytest.approx([network.fit() for _ in range(5)])
     assert late.weights == pytest.approx(network.weights, abs=1e-6)

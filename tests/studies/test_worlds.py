@@ -44,14 +44,11 @@ def test_of_nothing_no_question_can_be_decided():
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
 
 
-def test_a_cost_is_back_at_the_rollout_after_which_it_stays():
+def test_a_cost_is_back_once_it_stays_and_alarms_are_false_where_the_map_is_true():
     before = [0.9] * 30
     assert back([*before, 0.91, *[0.9] * 29], 150) == 5
     assert back([*before, 1.2, 0.9, 1.2, *[0.9] * 27], 150) == 20
     assert back([*before, *[1.2] * 30], 150) == np.inf
-
-
-def test_an_alarm_where_the_map_is_true_is_false_and_a_change_unnoticed_counts_whole():
     delay, false = noticing([50, 100, 150, 200, 250], [30, 54, 104, 154, 204, 254, 280])
     assert delay == 5
     assert false == pytest.approx(2 / (50 + 5 * 45))

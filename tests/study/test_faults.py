@@ -57,14 +57,11 @@ def test_wheels_that_slip_alike_lose_speed_and_one_alone_turns_the_robot(lost, s
     assert Fault(slip=0.5).gain(draws) @ [0.4, 0.0] == pytest.approx((speed, turn))
 
 
-def test_slip_is_drawn_anew_for_each_episode_and_its_mean_is_what_an_oracle_knows():
+def test_slip_and_noise_are_drawn_and_an_oracle_knows_the_mean_of_slip():
     rng, fault = RNG(3), FAULTS["slip"]
     drawn = np.array([fault.gain(rng) for _ in range(4000)])
     assert drawn.std(axis=0).min() > 0.01
     np.testing.assert_allclose(drawn.mean(axis=0), fault.model["gain"], atol=0.01)
-
-
-def test_noise_is_measured():
     fault, rng = Fault(noise=(0.1, 0.2, 0.0)), RNG(1)
     measured = np.array([fault.measure(STATE, rng) for _ in range(4000)])
     np.testing.assert_allclose(measured.std(axis=0), [0.1, 0.2, 0.0], atol=0.01)

@@ -61,12 +61,9 @@ def test_an_edit_is_noticed_where_it_can_change_a_number(before, after):
     assert (code(edited) != code(MODULE)) == ((before, after) in NUMBERS)
 
 
-def test_a_package_that_passes_a_name_on_as_another_counts_and_one_that_does_not_is_empty():
+def test_a_name_passed_on_as_another_and_an_edited_file_count_and_a_moved_one_does_not():
     assert code('"""A package."""\n\nfrom nmpcrl.study.run import run\n\n__all__ = ["run"]\n') == ""
     assert code("from nmpcrl.study.run import run as train\n")
-
-
-def test_a_moved_file_is_not_changed_and_an_edited_one_is():
     before = {"a.py": "1", "b.py": "2", "c.py": "2"}
     assert changed({"a.py": "1", "b.py": "2", "d/c.py": "2"}, before) == []
     assert changed({"a.py": "3", "b.py": "2", "c.py": "2"}, before) == ["a.py"]

@@ -15,14 +15,11 @@ NMPC = moving.controller()
 SWINGING = [moving.Sinusoidal((1.0, 2.0), (0.5, 0.0), period=8.0)]
 
 
-def test_a_sinusoidal_motion_solves_the_equation_of_an_oscillator():
+def test_a_motion_is_an_oscillator_s_or_stays_on_its_graph_at_its_speed_and_turns():
     motion, h = moving.Sinusoidal((1.0, 2.0), (0.5, -0.25), period=8.0, phase=0.3), 1e-3
     before, now, after = (motion(SECONDS + k * h) for k in (-1, 0, 1))
     pull = -((2 * np.pi / 8) ** 2) * (now - [1.0, 2.0])
     np.testing.assert_allclose((after - 2 * now + before) / h**2, pull, atol=1e-6)
-
-
-def test_a_polynomial_motion_stays_on_its_graph_at_its_speed_and_turns_at_both_ends():
     motion = moving.Polynomial((1.0, 2.0), (0.0, 2.0), (0.1, 0.0, -0.4), speed=0.5, phase=0.2)
     x, y = (motion(SECONDS) - [1.0, 2.0]).T
     s = y / 2  # its axis points along y, and across it is -x

@@ -7,28 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.study import ParameterError, geometry, paper
+from nmpcrl.study import ParameterError, geometry, paper, parameters
 from nmpcrl.study.geometry import MOST_OBSTACLES, centres_of, short_name
-from nmpcrl.study.parameters import (
-    LONGEST,
-    TRUTH,
-    number,
-    numbers,
-    one_of,
-    positive,
-    several,
-    shown,
-    whole,
-)
 
 ALLOWED = {
-    "word": one_of(("A", "B")),
-    "whole": whole(1, 300),
-    "positive": positive(1e6),
-    "range": number(-1e6, 1e6),
-    "truth": TRUTH,
-    "numbers": numbers([number(-1e6, 1e6)] * 2, "2 numbers"),
-    "seeds": several(whole(0, 100), "seed"),
+    "word": parameters.one_of(("A", "B")),
+    "whole": parameters.whole(1, 300),
+    "positive": parameters.positive(1e6),
+    "range": parameters.number(-1e6, 1e6),
+    "truth": parameters.TRUTH,
+    "numbers": parameters.numbers([parameters.number(-1e6, 1e6)] * 2, "2 numbers"),
+    "seeds": parameters.several(parameters.whole(0, 100), "seed"),
     "layout": geometry.layout(paper.LAYOUTS),
     "pose": geometry.pose(paper.LOWER, paper.UPPER),
 }
@@ -64,7 +53,7 @@ def test_any_value_is_converted_or_refused_in_one_short_sentence(kind, value):
         assert said.startswith("it = " if kind != "seeds" else ("it = ", "seed = "))
         assert allowed.text in said or kind == "seeds"
         assert "\n" not in said
-        assert len(said) < 2 * LONGEST + 100
+        assert len(said) < 2 * parameters.LONGEST + 100
     else:
         assert type(taken) in (str, int, float, bool, tuple)
         assert allowed.check("it", taken) == taken
@@ -112,8 +101,8 @@ def test_a_refusal_of_a_text_or_a_list_says_what_to_write(kind, given, said):
 
 def test_a_value_is_shown_on_one_short_line_and_a_notebook_shows_no_traceback():
     for value in (range(10**9), [3] * 10**6, "x" * 10**6, np.ones((50, 50))):
-        assert "\n" not in shown(value)
-        assert len(shown(value)) <= LONGEST
+        assert "\n" not in parameters.shown(value)
+        assert len(parameters.shown(value)) <= parameters.LONGEST
     assert ParameterError("it = 3")._render_traceback_() == ["ParameterError: it = 3"]
 
 

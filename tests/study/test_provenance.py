@@ -10,7 +10,7 @@ from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.provenance import ORIGINAL, identity, key, summary_key
 
 
-def test_a_key_depends_on_the_fields_that_differ_from_their_original_values():
+def test_a_key_depends_on_fields_that_differ_from_their_originals_and_on_centres(monkeypatch):
     assert {*ORIGINAL} == {field.name for field in fields(Experiment)} - {"layout"} | {"obstacles"}
     assert identity(Experiment()) == {}
     for name, value in {"seed": 1, "alpha": 2e-7, "theta": (0.9,) * 9, "solver": "ipopt"}.items():
@@ -19,9 +19,6 @@ def test_a_key_depends_on_the_fields_that_differ_from_their_original_values():
     assert identity(Experiment("RDES", gated=False)) == {"learner": "RDES", "gated": False}
     assert identity(Experiment(layout="B")) == {"obstacles": paper.LAYOUTS["B"]}
     assert key(Experiment()) != summary_key(Experiment())
-
-
-def test_the_centres_of_a_layout_count_and_not_its_letter(monkeypatch):
     before = key(Experiment(layout="A")), key(Experiment(layout="B"))
     monkeypatch.setitem(paper.LAYOUTS, "Z", paper.LAYOUTS["B"])
     assert key(Experiment(layout="Z")) == before[1]

@@ -47,15 +47,12 @@ def trial(**options):
     return Trial(**given | options)
 
 
-def test_a_trial_of_the_papers_robot_is_the_run_of_its_experiment():
+def test_a_trial_is_what_train_does_and_of_the_papers_robot_the_run_of_its_experiment():
     experiment = Experiment(episodes=2, steps=8, seed=3, evaluate_every=5)
     make = partial(expected_sarsa, alpha=paper.ALPHA)
     same = Trial("ES", make, paper.nmpc(), paper.THETA_INIT, seed=3, episodes=2, steps=8)
     one, other = run(experiment), run(same)
     assert_same_numbers(one, other, {"alpha_phi2"})
-
-
-def test_a_trial_is_what_train_does():
     records = run(trial())
     noise, _, world, _ = np.random.SeedSequence(0).spawn(4)
     explore = Exploration.draw(np.random.default_rng(noise), (2, 6, 1))

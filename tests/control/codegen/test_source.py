@@ -49,7 +49,7 @@ def test_what_is_not_known_is_named(function, reason):
         source(function)
 
 
-def test_matrices_vectors_scalars_and_zeros_are_laid_out_right():
+def test_matrices_vectors_scalars_zeros_and_sparse_arguments_are_laid_out_right():
     a, b = ca.SX.sym("a", 3), ca.SX.sym("b", 2, 3)
     results = {
         "matrix": b @ ca.diag(a),
@@ -67,9 +67,6 @@ def test_matrices_vectors_scalars_and_zeros_are_laid_out_right():
     compiled(function)(one, other, *out)
     for found, exact in zip(out, function(one, other), strict=True):
         same(found, exact.full().reshape(found.shape))
-
-
-def test_the_entries_of_a_sparse_argument_are_found_and_a_scalar_is_returned():
     lower = ca.SX.sym("z", ca.Sparsity.lower(2))
     function = ca.Function("corner", [lower], [2 * lower[1, 1]], ["z"], ["r"])
     assert compiled(function, returned=True)(np.array([[1.0, 0.0], [3.0, 4.0]])) == 8.0

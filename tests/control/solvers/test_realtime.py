@@ -11,7 +11,7 @@ pytestmark = pytest.mark.usefixtures("interpreted")
 STATE = np.array([0.9, -0.4])
 
 
-def test_a_warm_solve_makes_so_many_steps_and_a_cold_one_goes_on_to_the_optimum():
+def test_a_warm_solve_makes_so_many_steps_and_a_closed_loop_costs_what_optimal_plans_do():
     problem = pendulum()
     nmpc, short, long = (
         Nmpc(problem, solver=solver) for solver in ("riccati", real_time(), real_time(40))
@@ -24,9 +24,6 @@ def test_a_warm_solve_makes_so_many_steps_and_a_cold_one_goes_on_to_the_optimum(
     assert many.value == known.value
     assert few.value == pytest.approx(known.value, rel=1e-2)
     assert few.action != known.action
-
-
-def test_the_closed_loop_costs_what_optimal_plans_do():
     problem = pendulum()
 
     def plant(x, u, rng):

@@ -35,14 +35,11 @@ def before_a_wall(starts: int) -> Nmpc:
     return Nmpc(differential_drive(), task, horizon=40, gamma=1.0, solver=Riccati(starts=starts))
 
 
-def test_one_start_stands_before_a_wall_and_nine_drive_around_it():
+def test_nine_starts_drive_around_a_wall_and_of_equal_plans_the_first_is_kept():
     one, nine = (before_a_wall(k).solve(BEFORE, THETA) for k in (1, 9))
     assert nine.value < 0.97 * one.value
     assert one.states[:, 0].max() < 1.8 < nine.states[:, 0].max()
     assert before_a_wall(9).kkt_residual(nine, relative=True) < 1e-6
-
-
-def test_of_equal_plans_the_first_is_kept_and_a_warm_solve_has_one_start():
     free, near = np.array([-2.5, 1.5, 0.0]), BEFORE + 0.01
     nmpcs = [paper.nmpc(solver=Riccati(starts=k)) for k in (1, 9)]
     one, nine = (nmpc.solve(free, THETA) for nmpc in nmpcs)
