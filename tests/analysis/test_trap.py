@@ -48,7 +48,7 @@ def test_a_stretch_is_the_first_unbroken_part_in_which_the_robot_stands():
     assert stretch(found[:2], 0.05) == []
 
 
-def test_the_cliff_is_found_between_two_points_of_the_grid():
+def test_the_cliff_is_found_between_points_of_a_grid_and_raising_theta_c_across_it_costs_much():
     def cost(theta_c):
         return 100.0 + (60.0 if theta_c > 0.137 else theta_c)
 
@@ -57,9 +57,6 @@ def test_the_cliff_is_found_between_two_points_of_the_grid():
     assert found == pytest.approx(0.137, abs=1e-3)
     assert cost(found) < 101
     assert np.isnan(cliff(cost, grid[:2], np.array([100.0, 119.0])))
-
-
-def test_raising_theta_c_across_the_closing_of_a_gap_costs_much_and_by_nothing_nothing():
     theta = np.array([*paper.THETA_INIT[:-1], 0.15])
     assert raised_cost("E", theta, 0.0) == 0
     assert raised_cost("E", theta, 1 / 3) > 0.5

@@ -29,7 +29,7 @@ def lost(release, handed):
 
 
 @each_chapter
-def test_a_students_notebook_has_neither_solutions_nor_notes_and_its_checks_do_not_stop_it(name):
+def test_a_students_notebook_has_no_solution_and_links_of_an_edition_stay_beside_it(name):
     notebook = editions.student(CHAPTERS[name], CHAPTERS)
     text = nbformat.writes(notebook)
     assert "SOLUTION" not in text
@@ -39,10 +39,6 @@ def test_a_students_notebook_has_neither_solutions_nor_notes_and_its_checks_do_n
         assert one.solution not in text
     for one in exercises(notebook):
         assert all("raises-exception" in tags_of(cell) for cell in one.parts["check"])
-
-
-@each_chapter
-def test_links_of_an_edition_lead_to_pages_that_lie_beside_it(name):
     for cell in editions.teacher(CHAPTERS[name], CHAPTERS).cells:
         assert {link["page"] for link in editions.LINK.finditer(cell.source)} <= {*CHAPTERS}
 

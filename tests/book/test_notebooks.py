@@ -167,13 +167,9 @@ def unreadable(text: str) -> Iterator[str]:
 
 
 @each_notebook
-def test_formulas_and_links_are_those_that_every_editor_knows(name):
+def test_formulas_links_and_html_are_those_that_every_editor_knows(name):
     """VS Code has KaTeX for formulas, and markdown-it for the rest."""
     assert [one for text in texts(NOTEBOOKS[name].cells) for one in unreadable(text)] == []
-
-
-@each_notebook
-def test_html_in_prose_is_what_every_editor_shows(name):
     elements = set(re.findall(r"</?([a-z]+)[ >]", re.sub(r"`[^`]*`", "", prose(name))))
     assert elements <= {"a", "details", "summary", "br", "code", "sup", "sub"}
 

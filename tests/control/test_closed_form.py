@@ -67,7 +67,7 @@ def slopes(linear, theta, *action):
     return np.imag([value for value, _ in found]) / 1e-30, np.imag(policy).T / 1e-30
 
 
-def test_the_plan_and_all_its_derivatives_are_riccatis(linear, nmpc):
+def test_plan_action_value_and_all_their_derivatives_are_riccatis(linear, nmpc):
     theta, step, along = linear.theta, 1e-6, np.linspace(-1, 1, linear.theta.size)
     value, gains = recursion(linear, theta)
     slope, policy = slopes(linear, theta)
@@ -84,9 +84,6 @@ def test_the_plan_and_all_its_derivatives_are_riccatis(linear, nmpc):
         nmpc.value_hessian_times(solution, along), nmpc.value_hessian(solution) @ along,
     ):  # fmt: skip
         np.testing.assert_allclose(product, (above - below) / (2 * step), atol=1e-5)
-
-
-def test_the_action_value_is_one_step_and_riccati_from_there(linear, nmpc):
     action = np.array([4.0, -1.0])
     value, _ = recursion(linear, linear.theta, action)
     solution = nmpc.solve(STATE, linear.theta, action=action)

@@ -8,7 +8,7 @@ from small_problems import pendulum
 from nmpcrl.control import Problem, Soft
 
 
-def test_step_cost_and_plant_are_the_functions_of_the_problem_with_numbers():
+def test_step_cost_and_plant_are_the_problem_s_with_numbers_and_each_line_has_its_price():
     """The pendulum by NumPy; its last soft rows hold at stage N alone, and cost nothing."""
     problem, rng = pendulum(), np.random.default_rng(0)
     for _ in range(200):
@@ -27,9 +27,6 @@ def test_step_cost_and_plant_are_the_functions_of_the_problem_with_numbers():
     assert later.tolist() == problem.step(x, u, problem.vector(rate=1.7)).tolist()
     assert later.tolist() != problem.step(x, u).tolist()
     assert (cost, end) == (problem.cost(x, u), False)
-
-
-def test_every_line_of_a_table_has_its_price():
     discs = np.array([[0.0, 1.0], [0.5, 0.2]])
     problem = Problem(
         states=1, inputs=1, horizon=2, theta={"w": 2.0}, data={"discs": discs},

@@ -77,7 +77,7 @@ def test_a_claim_s_shares_are_those_of_its_verdict_with_wilson_s_interval(made_u
     assert f" in {yes} of {of} " in figure.finding
 
 
-def test_runs_that_were_stopped_are_drawn_beyond_all_others_and_not_dropped(made_up):
+def test_stopped_runs_are_drawn_beyond_all_others_and_a_median_is_one_of_the_runs(made_up):
     unlike = {True: {"reached": 40}, False: {"training": 2.0}}
     found = made_up(lambda e: unlike[e.seed == 0] if e.learner == "DES" else {})
     panel = drawn("C1", found)[1].axes[0]
@@ -86,9 +86,6 @@ def test_runs_that_were_stopped_are_drawn_beyond_all_others_and_not_dropped(made
     assert len(heights) == 2 * PAIRS
     assert beyond.sum() == PAIRS / SEEDS
     assert "∞" in [text.get_text() for text in panel.texts]
-
-
-def test_a_median_between_a_half_that_failed_and_one_that_did_not_is_one_of_them(made_up):
     found = made_up(lambda e: {"reached": 40} if e.learner == "RDES" and e.seed < 2 else {})
     panel = drawn("C9", found)[1].axes[0]
     medians = [path.vertices[0, 1] for lines in panel.collections for path in lines.get_paths()]
@@ -169,7 +166,7 @@ def curves(found, pair=("DES", "RDES"), layout="A"):
     return results.learning_curves(found, pair, layout, thresholds.divergence, "diverged")
 
 
-def test_what_is_off_the_scale_is_in_its_strip_and_counted_in_the_title(made_up):
+def test_a_curve_off_the_scale_is_in_its_strip_and_a_band_holds_the_middle_half(made_up):
     found = made_up(lambda e: {"training": 2.0, "reached": 150 if e.decay == "episode" else None}
                     if (e.learner, e.layout) == ("DES", "A") else {})  # fmt: skip
     figure = curves(found)
@@ -181,9 +178,6 @@ def test_what_is_off_the_scale_is_in_its_strip_and_counted_in_the_title(made_up)
         des, *others = (line.get_ydata() for line in panel.get_lines())
         assert (des[-1], max(des)) == (middle, middle)
         assert max(map(max, others)) < results.CEILING < start
-
-
-def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     found = made_up(lambda e: {"end": 0.6 + 0.1 * e.seed}, seeds=(0, 1, 2, 3, 4))
     panel = curves(found, ("ES", "GES")).axes[2]
     band = panel.collections[1].get_paths()[0].vertices[:, 1]  # of ES, without noise
@@ -191,7 +185,7 @@ def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     assert panel.get_lines()[0].get_ydata()[-1] == pytest.approx(0.8)
 
 
-def test_endings_are_counted_and_runs_that_were_stopped_are_not_drawn(made_up):
+def test_endings_and_inputs_beyond_bounds_are_counted_and_stopped_runs_not_drawn(made_up):
     stuck = made_up().summaries[Experiment("RDES")].states.copy()
     stuck[2:] = stuck[1]
     changes = {("RDES", 0): {"states": stuck}, ("RDES", 1): {"reached": 50}}
@@ -199,9 +193,6 @@ def test_endings_are_counted_and_runs_that_were_stopped_are_not_drawn(made_up):
     assert figure.finding == "After 24 of 32 runs of RDES and GES the robot reaches the target"
     ways = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 5]
     assert len(ways) == 2 * (3 * SEEDS - 1)
-
-
-def test_inputs_that_leave_their_bounds_are_counted(made_up):
     found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
     for evidence, count in ((made_up(), 0), (found, 10)):
         assert f"; {count} inputs leave their" in results.controls(evidence, "A").finding

@@ -32,7 +32,7 @@ def last_is_the_solution(nmpc, state, theta, data=None):
     return solution, iterates
 
 
-def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance():
+def test_mu_falls_and_the_error_reaches_the_tolerance_later_without_curvature():
     cold = trace(NMPC.ocp, BUSY, THETA)
     assert (np.diff(cold.mu) <= 0).all()
     assert (cold.error >= cold.mu).all()
@@ -40,9 +40,6 @@ def test_mu_falls_from_iterate_to_iterate_and_the_error_reaches_the_tolerance():
     assert np.isnan(cold.delta).tolist() == [False] * (len(cold) - 1) + [True]
     assert cold.delta.max() > 0  # which some first step needs, and the last does not
     assert cold.delta.iloc[-2] == 0
-
-
-def test_gauss_newton_needs_no_delta_and_more_iterations():
     cold, straight = (trace(NMPC.ocp, BUSY, THETA, curvature=how) for how in (True, False))
     assert straight.delta.max() == 0
     assert len(straight) > 3 * len(cold)

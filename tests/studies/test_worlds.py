@@ -103,13 +103,12 @@ def test_the_same_run_has_the_same_numbers_and_another_seed_others(part, arm, pl
     assert one["cost"] != other["cost"]
 
 
-def test_a_frozen_view_fares_as_its_world_says():
+def test_a_frozen_view_fares_as_its_world_says_and_a_body_that_draws_has_several_rollouts(
+    monkeypatch,
+):
     row = ran("moving", "frozen init", FOUR)
     made = judged(controller(), THETA, World(SCENARIOS[FOUR], frozen))
     assert (row["cost"], row["inside"], row["collisions"]) == (made.cost, *made.contacts)
-
-
-def test_a_body_that_draws_is_judged_by_several_rollouts(monkeypatch):
     one = ran("model", "noise init")
     monkeypatch.setattr(worlds_run, "DRAWS", 1)
     assert ran("model", "noise init")["cost"] != one["cost"]

@@ -178,14 +178,6 @@ def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
     assert not restarts
 
 
-def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(failing):
-    failing(lambda call: True)
-    records = run(Experiment(learner="ES", episodes=20, steps=6, evaluate_every=4))
-    assert records.facts["stopped"].startswith("diverged: 10 episodes in a row")
-    np.testing.assert_array_equal(records.steps["episode"], np.arange(10))
-    assert (records.evaluations["cost"] == np.inf).all()
-
-
 @pytest.mark.parametrize("steps", [1, 2, 3, 6])
 def test_a_theta_that_explodes_ends_the_run_and_is_not_evaluated(steps):
     records = run(Experiment(learner="ES", episodes=4, steps=steps, alpha=1e5, evaluate_every=1))

@@ -77,15 +77,12 @@ def test_an_obstacle_that_stands_still_gives_the_static_bits(name):
     np.testing.assert_array_equal(static.costs, found.costs)
 
 
-def test_the_clock_begins_anew_and_a_plan_sees_its_own_stages():
+def test_the_clock_begins_anew_and_plans_and_overlaps_are_of_their_own_steps():
     world = World(MOVING)
     first, again = (evaluate(NMPC, THETA, 20, **world.environment) for _ in range(2))
     np.testing.assert_array_equal(first.states, again.states)
     np.testing.assert_array_equal(world.data(3)["centres"], known(MOVING, 3))
     assert not np.array_equal(world.data(3)["centres"][1:], moving.frozen(MOVING, 3)[1:])
-
-
-def test_a_state_is_inside_where_the_overlap_of_its_own_step_is_positive():
     motions = [Straight((0.0, 0.0), (1.0, 0.0))]  # 0.2 m a step
     states = np.array([[0.0, 1.2, 0.0], [1.46, 0.0, 0.0], [0.4, 1.26, 0.0]])
     assert inside(states, motions)[:, 0].tolist() == [True, False, False]

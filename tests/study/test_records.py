@@ -26,7 +26,7 @@ def path(tmp_path):
     return tmp_path / "folder" / "run.npz"
 
 
-def test_a_wrong_byte_is_noticed_or_changes_nothing(path):
+def test_a_wrong_byte_is_noticed_or_changes_nothing_and_a_first_edition_s_run_is_read(path):
     RUN.save(path)
     assert about(path).facts == RUN.facts
     content, noticed = path.read_bytes(), 0
@@ -39,9 +39,6 @@ def test_a_wrong_byte_is_noticed_or_changes_nothing(path):
         except DamagedRecords:
             noticed += 1
     assert noticed > 80
-
-
-def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):
     replace(RUN, experiment={**RUN.experiment, "plant": "model"}).save(path)
     assert_equal(Records.load(path), RUN)
 

@@ -51,7 +51,7 @@ def test_values_and_their_gradients_are_csnlps(agent, kind):
     assert compared > 30
 
 
-def test_the_plant_costs_what_mpcrls_example_says():
+def test_the_plant_costs_what_mpcrls_example_says_and_an_informed_plan_knows_it():
     outside = gz.cost(np.array([-0.2, 1.5]), np.array([0.5]))
     assert outside == pytest.approx(0.5 * (0.04 + 2.25 + 0.5 * 0.25 + 100 * (0.2 + 0.5)))
     rng = np.random.default_rng(0)
@@ -59,9 +59,6 @@ def test_the_plant_costs_what_mpcrls_example_says():
     assert -0.1 <= later[0] - (0.35 * 0.15 + 0.00813) <= 0
     assert later[1] == pytest.approx(1.1 * 0.15 + 0.02)
     assert (cost, end) == (gz.cost(gz.START, np.array([0.1])), False)
-
-
-def test_an_informed_plan_knows_the_plant_and_its_mean_disturbance():
     known = PROBLEM.split(gz.problem(informed=True).theta)
     np.testing.assert_array_equal(known["A"], gz.TRUE_A)
     np.testing.assert_allclose(known["b"], [-0.05, 0.0])

@@ -66,16 +66,13 @@ def agent():
     return peers.agent(peers.end(plan, objective, "ipopt, 1e-10"), lqr.problem())
 
 
-def test_value_and_action_are_csnlps(agent):
+def test_value_and_action_are_csnlps_and_the_agent_of_the_peer_meets_our_plant(agent):
     for state in np.random.default_rng(3).normal(size=(5, 2)):
         solution = NMPC.solve(state, lqr.problem().theta)
         with peers.silent():
             action, theirs = agent.state_value(state, True)
         assert float(theirs.f) == pytest.approx(solution.value, rel=1e-7)
         assert float(action) == pytest.approx(solution.action[0], rel=1e-5, abs=1e-7)
-
-
-def test_the_agent_of_the_peer_meets_our_plant(agent):
     calls = []
 
     def plant(state, action, rng):
