@@ -81,7 +81,7 @@ def test_each_push_runs_the_same_here_and_there():
     assert asked == [step["run"] for step in build if step.get("run")]
 
 
-def test_what_the_package_imports_is_pinned_once_to_one_version():
+def test_what_is_imported_is_pinned_once_and_all_places_name_the_same_pythons():
     lines = (ROOT / "environment.txt").read_text().splitlines()
     pins = [Requirement(line) for line in lines if line and not line.startswith("#")]
     names = [canonicalize_name(one.name) for one in pins]
@@ -92,9 +92,6 @@ def test_what_the_package_imports_is_pinned_once_to_one_version():
     needed = {*project["dependencies"], *(name for extra in extras for name in extra)}
     needed = {name for name in needed if not name.startswith("nmpcrl[")}  # another extra
     assert {canonicalize_name(Requirement(one).name) for one in needed} <= {*names}
-
-
-def test_all_places_name_the_same_pythons():
     requires = SpecifierSet(PROJECT["project"]["requires-python"])
     pythons = [python for python in (f"3.{minor}" for minor in range(50)) if python in requires]
     assert re.search(r"^PYTHONS := (.*)$", MAKEFILE, flags=re.M)[1].split() == pythons

@@ -19,15 +19,14 @@ def everywhere(records):
     return dropped_curvature(records, samples=10_000)
 
 
-def test_samples_are_spread_over_the_run_and_the_ratio_is_dropped_over_printed(records):
+def test_samples_are_spread_and_the_printed_and_dropped_terms_are_theta_s_and_the_hessian_s(
+    records, everywhere
+):
     measured = dropped_curvature(records, samples=20)
     np.testing.assert_array_equal(measured.ratio, measured.dropped / measured.direction)
     assert 10 <= len(measured.ratio) <= 20
     assert set(measured.episode) == {0, 1}
     assert (np.diff(measured.episode) >= 0).all()
-
-
-def test_theta_went_the_printed_direction_and_the_dropped_term_is_the_hessian(records, everywhere):
     steps = records.steps
     went = np.diff(np.vstack([records.experiment["theta"], steps["theta"]]), axis=0) / paper.ALPHA
     lengths = np.linalg.norm(went, axis=1)[1:]

@@ -98,16 +98,12 @@ def test_the_boundary_is_the_one_of_the_theta_that_the_step_was_solved_with():
     assert metrics.boundary_share(run, scene) == pytest.approx(2 / 3)
 
 
-def test_features_are_compared_with_those_of_the_next_step_of_the_episode():
+def test_features_and_predictions_are_compared_with_the_next_step_of_the_episode():
     phi = np.zeros((6, D))
     phi[:, :2] = [[1, 0], [2, 0], [0, 1], [3, 0], [np.nan, 0], [1, 1]]
     run = records(np.ones((2, 3)), features=phi)  # three pairs are of two episodes, or unknown
     np.testing.assert_allclose(metrics.next_over_this(run), [2 * paper.GAMMA, 0])
     assert metrics.parallel_share(run) == 0.5
-
-
-def test_the_online_error_is_that_of_a_prediction_made_before_theta_moved():
-    """Of a value that is linear in theta, whose gradient phi is exact."""
     phi, theta = np.random.default_rng(0).normal(size=(2, 6, D))
     before, wrong = np.vstack([np.zeros(D), theta[:-1]]), np.arange(1.0, 7.0)
     true = np.append(np.sum(before[:-1] * phi[1:], axis=1), 0.0)

@@ -89,7 +89,9 @@ def test_a_search_refuses_nonsense_by_name(call, message):
         call()
 
 
-def test_the_least_cost_is_found_from_theta_init_on_with_every_improvement(bowl):
+def test_the_least_cost_is_found_and_a_search_begins_as_one_with_a_smaller_budget(
+    bowl, monkeypatch
+):
     found = search(Search(budget=1500))
     assert len(bowl.asked) == found.made <= 1500
     assert found.cost == pytest.approx(7, abs=1e-3)
@@ -97,9 +99,6 @@ def test_the_least_cost_is_found_from_theta_init_on_with_every_improvement(bowl)
     assert (found.rollouts[0], found.initial) == (1, Bowl()(START))
     assert (np.diff(found.rollouts) > 0).all()
     assert (np.diff(found.best) < 0).all()
-
-
-def test_a_search_begins_as_one_with_a_smaller_budget_and_seeds_differ(bowl, monkeypatch):
     long = search(Search(budget=300))
     for budget in (LEAST, 100, 200):
         short = search(Search(budget=budget))

@@ -45,7 +45,7 @@ def test_the_interquartile_mean_is_the_mean_of_the_middle_half(scores, value):
     assert (estimate.high == np.inf) == (np.inf in scores)
 
 
-def test_draws_stay_within_a_layout_and_repeat_and_need_two_runs():
+def test_draws_stay_within_a_layout_and_improvement_is_mann_and_whitney_s_u():
     between = interquartile_mean(np.repeat([1.0, 2, 3, 4, 5, 6], 20), LAYOUTS)
     assert (between.low, between.high) == (between.value, between.value)
     scores = np.random.default_rng(3).normal(size=120)
@@ -53,9 +53,6 @@ def test_draws_stay_within_a_layout_and_repeat_and_need_two_runs():
     single = interquartile_mean(np.array([1.0, 2, 3]), ["A", "A", "B"])
     assert single.value == 2
     assert np.isnan([single.low, single.high]).all()
-
-
-def test_the_probability_of_improvement_is_mann_and_whitney_s_u_over_the_number_of_pairs():
     rng = np.random.default_rng(4)
     first, second = rng.integers(0, 5, (2, 30)).astype(float)
     u = stats.mannwhitneyu(second, first).statistic

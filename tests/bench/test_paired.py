@@ -37,16 +37,13 @@ def test_a_machine_that_becomes_slower_for_all_changes_next_to_nothing():
     assert before.low < after.value < before.high
 
 
-def test_a_few_long_steps_count_by_their_length_as_they_do_in_a_run():
+def test_long_steps_count_by_their_length_and_rounds_like_their_neighbours_for_fewer():
     ones = np.ones(ROUNDS)
     long = np.where(np.arange(ROUNDS) % 13 == 0, 14.0, 1.0)
     found = paired_ratio(long, ones, long, ones)
     assert found.value == pytest.approx(long.mean())
     assert found.value > 1.9
     assert np.median(long / ones) == 1  # which is what a median of ratios would say
-
-
-def test_rounds_that_resemble_their_neighbours_are_worth_fewer():
     rng = np.random.default_rng(0)
     alone = np.exp(rng.normal(0, 0.2, ROUNDS))
     alike = np.exp(np.repeat(rng.normal(0, 0.2, ROUNDS // BLOCK), BLOCK))

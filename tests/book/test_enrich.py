@@ -71,7 +71,7 @@ def test_a_cell_of_prose_only_imports_and_shows(code, expected):
     assert prose.calls_prose(code) == expected
 
 
-def test_a_page_takes_what_a_cell_of_a_notebook_displayed():
+def test_a_page_takes_and_a_downloaded_notebook_keeps_what_a_cell_displayed():
     cell = new_code_cell("table()", metadata={"tags": ["verdicts"]})
     link = '<a href="evidence.{}#evidence-c1">'
     cell.outputs = [displayed(text_html=f"<table>{link.format('ipynb')}</table>")]
@@ -83,9 +83,6 @@ def test_a_page_takes_what_a_cell_of_a_notebook_displayed():
     assert f"<table>{link.format('html')}</table>" in page
     cell.outputs = []
     assert prose.displayed(book, "verdicts") == ""
-
-
-def test_a_downloaded_notebook_hides_the_calls_and_keeps_what_they_displayed():
     words = new_code_cell('say("So.")', outputs=[displayed(text_markdown="So.")])
     code = new_code_cell("x = 1", metadata={"papermill": {"duration": 1.0}})
     first, second = download(new_notebook(cells=[words, code])).cells

@@ -15,16 +15,13 @@ BOOK = Path(__file__).resolve().parents[2] / "book"
 )
 
 
-def test_the_entry_of_the_page_keeps_to_the_budget_and_saves_cost():
+def test_the_entry_of_the_page_saves_cost_and_a_robot_has_all_that_the_page_names():
     (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.M | re.S)
     exec(code, space := {})
     found = judge(space["factory"], "T01", 0, 4)
     assert (found.episodes, found.over) == (4, False)
     assert solved(found)
     assert gain(found) > 0
-
-
-def test_a_robot_has_all_that_the_page_names():
     named = set(re.findall(r"`robot\.(\w+)", PAGE))
     assert len(named) > 9
     assert all(hasattr(Robot("T01", 2, 0), name) for name in named)

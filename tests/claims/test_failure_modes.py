@@ -73,13 +73,10 @@ def test_a_mechanism_is_found_in_the_episodes_in_which_the_cost_rose(columns, na
     assert mechanism(made(**columns), THROUGH) == name
 
 
-def test_episodes_without_a_prediction_do_not_count():
+def test_episodes_without_a_prediction_do_not_count_and_a_used_gap_closes_once():
     run = made(bias=(WINDOW, 30.0))
     run.episodes["bias"][AMONG] = run.episodes["delta"][AMONG] = np.nan
     assert mechanism(run, THROUGH) == "network"
-
-
-def test_only_a_gap_that_the_first_rollout_used_closes_and_only_once():
     closed = made(theta_c=(slice(None), CLOSING + 0.1))
     assert mechanism(closed, AROUND) == OTHER
     assert mechanism(closed, THROUGH) == "gap"

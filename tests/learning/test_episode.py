@@ -145,14 +145,14 @@ def test_a_solve_that_fails_warm_is_begun_anew_by_both(failing, name):
     assert 0 < (columns["restarts"] > 0).sum() < 30
 
 
-def test_where_no_solver_finds_an_optimum_the_episode_ends_in_both(failing, monkeypatch):
+def test_without_an_optimum_an_episode_ends_and_without_a_derivative_algebra_answers_in_both(
+    failing, monkeypatch
+):
     failed = raising(SolverError("failed", THETA[:3], THETA))
     monkeypatch.setattr("nmpcrl.control.solvers.nlpsol.Program.solve", failed)
     columns = assert_same(MAKE["ES"], failing(all_fail=True))
     assert np.isnan(columns["delta"]).sum() == EPISODES
 
-
-def test_without_a_derivative_of_the_plan_dense_algebra_answers_in_both(monkeypatch):
     @njit(SLOPES)
     def slopes(
         data, lower, upper, sides, kind, discount, weights, tie,

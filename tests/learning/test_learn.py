@@ -95,7 +95,7 @@ def test_a_run_goes_on_to_the_last_bit_in_another_process_too(nmpc, undo):
     assert len(whole.costs) == 4
 
 
-def test_a_divergence_says_what_was_reached_and_a_long_step_how_long_it_may_be(nmpc):
+def test_a_divergence_a_long_step_and_noise_that_is_clipped_are_told_with_their_numbers(nmpc):
     how = WORLD | {"episodes": 20, "steps": 5}
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
@@ -108,10 +108,6 @@ def test_a_divergence_says_what_was_reached_and_a_long_step_how_long_it_may_be(n
     longest = np.square(np.linalg.norm(first, axis=1)).max()
     said = next(one for one in result.warnings if "phi" in one)
     assert float(said.split("below ")[-1]) == pytest.approx(2 / longest, rel=0.05)
-
-
-def test_noise_that_is_clipped_at_both_bounds_is_told_with_shares(nmpc):
-    """A plan that lies at one bound, as where the target is out of reach, is no reason to warn."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         learn(nmpc, episodes=2, steps=10, plant=lambda x, u, rng: (x - 9, 0.0, False), start=[0.0])

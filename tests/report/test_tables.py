@@ -207,7 +207,7 @@ def test_the_numbers_of_an_agent_are_those_of_its_course_and_of_the_questions():
     assert agents.seconds(table)["SAC"] > 1
 
 
-def test_a_ratio_of_times_has_its_interval_and_carries_what_it_is_of(timings):
+def test_a_ratio_of_times_has_its_interval_and_is_one_half_where_slow_solves_are_alike(timings):
     shown = str(timing.to_es(timings, "ipopt", "RDES"))
     row = timings.set_index(["solver", "learner"]).loc["ipopt", "RDES"]
     interval = f"{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
@@ -218,9 +218,6 @@ def test_a_ratio_of_times_has_its_interval_and_carries_what_it_is_of(timings):
     assert table["ms per fit"]["ipopt", "ES"] == "–"
     with pytest.raises(KeyError):
         timing.to_es(timings, "scipy", "RDES")
-
-
-def test_slow_solves_give_one_half_only_where_all_take_alike(timings):
     timings.loc[timings.learner == "ES", "ms_per_solve"] *= 0.8
     alike, warm = timing.ratios_at_paper_speed(timings)
     assert (alike, warm) == (pytest.approx(0.5, abs=0.005), pytest.approx(0.63, abs=0.005))
@@ -243,13 +240,10 @@ def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a
     assert found.ES["lag"].tolist() == pytest.approx([0.05, 0.05])
 
 
-def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_not_touch():
+def test_depth_is_measured_from_the_edge_and_each_view_and_policy_has_a_row():
     one = Encounters(np.zeros((paper.STEPS + 1, 3)), 0.0, Contacts(0, 0), arrived=False)
     assert worlds.deepest(one, still([(3.0, 0.0), (1.0, 0.0)])) == pytest.approx(0.25)
     assert worlds.deepest(one, still([(3.0, 0.0)])) == 0
-
-
-def test_the_table_of_moving_obstacles_has_a_row_of_each_view_and_policy():
     runs = [
         {"part": "moving", "arm": f"{view} {policy}", "place": place, "k": k, "cost": cost,
          "arrived": True, "inside": k * (policy == "ES"), "seconds": 1.0}

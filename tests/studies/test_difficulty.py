@@ -42,15 +42,12 @@ def test_sight_ends_at_the_disc_or_at_the_wall(point, directions, seen):
     assert sight(np.array([point]), directions, TASK)[0] == pytest.approx(seen)
 
 
-def test_points_along_a_path_are_equally_far_apart_however_it_was_sampled():
+def test_points_of_a_path_are_equally_far_apart_and_its_distance_and_width_are_by_hand():
     path = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.0], [1.0, 0.0], [1.0, 0.5]])
     points = spaced(path)
     assert len(points) == 11
     assert points[:7, 0] == pytest.approx(0.15 * np.arange(7))
     assert points[-1] == pytest.approx([1.0, 0.5])
-
-
-def test_a_path_has_its_distance_and_width_beside_a_wall_and_between_discs_and_its_tortuosity():
     task = paper.task(((-2.0, 8.9),))  # far away
     found = barn(np.array([[3.0, -2.7], [3.0 + 1e-9, -2.7]]), task)
     assert found["closest"] == pytest.approx(0.3)
