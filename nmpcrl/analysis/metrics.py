@@ -77,7 +77,7 @@ def late_training_cost(cost: Vector) -> float:
 
 
 def cost_ratio(cost: Vector, frozen: Vector) -> float:
-    """`late_training_cost` of a run over that of the frozen learner under the same noise.
+    """`late_training_cost` of a run over the frozen learner's under the same noise.
 
     The ratio is infinite if the run alone lost half of its late episodes, 0 if the frozen learner
     alone did, nan if both did.

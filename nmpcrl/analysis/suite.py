@@ -102,7 +102,7 @@ class Robot:
         return self.rollout(theta).cost
 
     def env(self) -> Any:
-        """`nmpcrl/Robot-v0` in this place, whatever layout a reset asks for."""
+        """`nmpcrl/Robot-v0` in this place, also where a reset asks for another layout."""
         from nmpcrl.study.robot import RobotEnv  # imports Gymnasium, which few entries need
 
         robot = self
@@ -360,7 +360,7 @@ def judge_all(
 ) -> pd.DataFrame:
     """Judge an entry, by its name, in the first `layouts` places with every seed.
 
-    The places are those of `JUDGE`, or with `moving` the scenarios. A row has entry, place, k and
+    The places are `JUDGE`, or with `moving` the scenarios. A row has entry, place, k and
     the fields of `Judgement`, repeatable except for seconds.
     """
     places = SCENARIOS if moving else JUDGE

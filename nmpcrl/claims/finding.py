@@ -42,7 +42,7 @@ def finding(found: Published) -> "pd.Series[Any]":
     per_step, early_per_step = _stopped(main, "step")
     riccati = found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]
     numbers = {
-        # runs of `LEARNERS` with open gaps that solve their layout, and such with a closed gap
+        # runs of `LEARNERS` that solve their layout: with open gaps, and with a closed gap
         "arrived_open": count(arrived[~closed]),
         "arrived_closed": count(arrived[closed]),
         "open_in": tuple(runs.layout[~closed].unique()),  # layouts of runs with open gaps
@@ -50,7 +50,7 @@ def finding(found: Published) -> "pd.Series[Any]":
         # median reduction of the noise-free cost by runs with open gaps that solve their layout
         "learned": float(runs.saved[arrived & ~closed].median()),
         # layouts that theta_init with theta_c = d_o solves; of these, layouts where it costs less
-        # than any run of `LEARNERS` in the end; its median reduction there and that of the runs;
+        # than any run of `LEARNERS` in the end; its median reduction there, and the runs';
         # the least and largest increase of the cost in the others
         "by_hand": (len(there), len(hand)),
         "better": count(there.saved > most),

@@ -27,7 +27,7 @@ def compared(
     """The fields of a claim that compares the final noise-free costs of two learners.
 
     The numbers are `size` of the cost of the first minus the second's, in shares of theta_init's,
-    in the cells of the learner that is not the paper's.
+    in the cells of our own learner.
     """
     first, second = learners
     ours = tuple(name for name in learners if name not in PAPER)

@@ -1,7 +1,7 @@
 """The commit that fixed the thresholds and the rule, and the definitions that came later.
 
-The manifest of the published data names the commit; a test compares `NUMBERS` with those of every
-state of the code since. `decided_since.csv` lists later definitions.
+The manifest of the published data names the commit; a test compares `NUMBERS` with every later
+state of the code. `decided_since.csv` lists later definitions.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ NUMBERS = {name: getattr(home, name) for home, names in MODULES.items() for name
 def fixed(about: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Hash and date (UTC) of two commits: "thresholds" fixed, and first runs "published".
 
-    `about` is that of `published.load()`. Empty if the manifest has other numbers than the code.
+    `about` is a field of `published.load()`. Empty if the manifest has other numbers than the code.
     """
     known = {**about.get("fixed", {})}
     today = {name: list(one) if isinstance(one, tuple) else one for name, one in NUMBERS.items()}

@@ -84,7 +84,7 @@ class Claim(ABC):
 
 
 def judge(claims: Mapping[str, Claim], *observed: Any, **further: Any) -> tuple[Verdict, ...]:
-    """The verdicts on claims, in order; the other arguments are those of `Observations`."""
+    """The verdicts on claims, in order; the other arguments make the `Observations`."""
     known = Observations(*observed, **further)
     return tuple(claim.judge(known) for claim in claims.values())
 
@@ -212,9 +212,8 @@ def arms(
     """The runs of each learner, in the same order of layout, decay and seed.
 
     A run that is missing, or shorter than the paper's, is a row of nan. One that was stopped left
-    no policy, so its final cost is infinite, whatever the last rollout cost. `runs` are of
-    `rows.table`, all of one setting. The cells are those of the learners in `among`, by default of
-    `learners`.
+    no policy, so its final cost is infinite. `runs` are of `rows.table`, all of one setting. The
+    cells are the ones of the learners in `among`, by default of `learners`.
     """
     asked = runs[runs.learner.isin(among or learners)]
     cells = pd.MultiIndex.from_frame(asked[CELL].drop_duplicates())

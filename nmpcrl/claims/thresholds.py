@@ -29,7 +29,7 @@ DIVERGED = 1.5
 # A run is unstable if it diverged, or if its noise-free cost ranges over more than this share of
 # theta_init's in the second half of training.
 UNSTABLE = 0.05
-# "Half the time" and "the same time": the ratio of the time of a step to that of ES.
+# "Half the time" and "the same time": the time of a step over the time of a step of ES.
 HALF = (0.4, 0.6)
 SAME_TIME = (0.9, 1.1)
 # Two policies are the same if their trajectories without noise stay this close [m] and their costs
@@ -41,7 +41,7 @@ MORE_ACCURATE = 0.8
 # Learning beats the frozen theta if the noise-free cost falls by at least this share.
 BETTER = 0.01
 
-# A ratio of times is near what is claimed, and the claim partly reproduced, within these.
+# Ranges in which a ratio of times is near the claimed one, and the claim partly reproduced.
 NEAR_HALF = (0.0, 1.0)
 NEAR_SAME_TIME = (0.8, 1.25)
 

@@ -67,7 +67,7 @@ class Verdict:
     outcome: Outcome
     would_change: str = ""  #: where another verdict is expected
     share: float | None = None  #: of yes; None for a claim that asks no runs
-    interval: tuple[float, float] | None = None  #: of the share, whatever the missing say; or ratio
+    interval: tuple[float, float] | None = None  #: of the share with any missing answers; or ratio
     by_layout: dict[str, Outcome] = field(default_factory=dict)
     by_decay: dict[str, Outcome] = field(default_factory=dict)
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  #: yes, answers, "all", "A"

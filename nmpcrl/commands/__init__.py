@@ -1,4 +1,4 @@
-"""The command `nmpcrl`, a module a command; what a command needs is imported when it is called."""
+"""The command `nmpcrl`, a module a command; a command imports the library when it is called."""
 
 import os
 from pathlib import Path
@@ -34,7 +34,7 @@ def main() -> None:
       nmpcrl runs --sort cost
       nmpcrl show GES
     """
-    os.environ["MPLBACKEND"] = "agg"  # no command opens a window, whatever is set elsewhere
+    os.environ["MPLBACKEND"] = "agg"  # no command opens a window
     if Path(runs := os.environ.get("NMPCRL_RUNS", "")).is_file():
         raise click.ClickException(f"NMPCRL_RUNS = {runs!r} must be a folder")
 

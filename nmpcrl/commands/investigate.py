@@ -28,7 +28,7 @@ BOOK = {  # the investigations of the book, in `nmpcrl.studies`
 @click.argument("name", metavar="NAME|FILE.py")
 @click.option("--part", "parts", multiple=True, help="Only this part; by default all.")
 @WORKERS
-@click.option("--dry-run", is_flag=True, help="Only report what is missing, and its price.")
+@click.option("--dry-run", is_flag=True, help="Only report missing rows and their price.")
 @click.option("--publish", is_flag=True, help="Add complete arms to the published table.")
 @click.option("--judge", is_flag=True, help="Only print the answers of the published table.")
 def investigate(
@@ -84,12 +84,12 @@ def _load(name: str) -> "Investigation":
 
 
 def _report(one: "Investigation", parts: tuple[str, ...]) -> None:
-    """How many rows of each part are stored, and what the others take."""
+    """The stored rows of each part, and the time that the others take."""
     for part in parts:
         rows, missing, seconds, unknown = one.price(part)
         said = [f"{rows - missing} of {rows} rows are stored"] if rows else []
         if missing:
-            said.append(f"the others take about {seconds / 60:.1f} minutes of one core")
+            said.append(f"the others take about {max(seconds / 60, 0.1):.1f} minutes of one core")
         if unknown:
             said.append(f"with the arms of earlier rows, for {unknown}" if rows else unknown)
         click.echo(f"{part}: {'; '.join(said)}")

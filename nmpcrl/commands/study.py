@@ -12,7 +12,7 @@ from nmpcrl.commands.options import WORKERS, new_file
 @click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
 @WORKERS
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
-@click.option("--dry-run", is_flag=True, help="Only report what is missing.")
+@click.option("--dry-run", is_flag=True, help="Only report missing runs.")
 @click.option("--table", metavar="PATH", type=new_file, help="Write a CSV row per episode.")
 @click.option("--publish", is_flag=True, help="Write the runs to book/published.")
 @click.option("--judge", is_flag=True, help="Only show the verdicts on the published study.")

@@ -1,8 +1,8 @@
 """SAC and TD3, which learn without an NMPC, beside the best search over theta: 17 questions.
 
 Settings, parts and questions, in `agents.toml`, were committed before any agent was tuned or
-judged; a test compares them with that commit, whose file also says what each question measures and
-where yes ends.
+judged; a test compares them with that commit, whose file also has the measure of each question and
+its border.
 
 Of four settings of an agent, the one with the least mean of J / J_init in three layouts is judged.
 It **matches** theta_init where its rollout without noise costs no more, and **solves** a layout
@@ -131,7 +131,7 @@ class Course:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The median at the end, and when it matches theta_init; nothing without runs."""
+        """The median at the end, and when it matches theta_init; empty without runs."""
         if self.shares.empty:
             return {}
         first, always = self.matched

@@ -8,7 +8,7 @@ the path. Here
   disc is as wide as plans at theta_c = 0 keep;
 - the path is the first trajectory of the controller, without noise, from theta_init, up to where
   the robot has arrived; its points are `SPACING` apart;
-- a point within a disc is at distance 0 from it and sees nothing.
+- a point within a disc is at distance 0 from it and has no view.
 
 A predictor is a logistic regression of one measure, fitted on some layouts and scored on others: by
 the area under the ROC curve and by the Brier score. The bootstrap draws layouts.
@@ -45,10 +45,10 @@ STOPS = {n: f"stops_{n}" for n in (paper.HORIZON, *HORIZONS)}  # columns by hori
 
 MEASURES = (  # a higher one means easier, or harder where a comment says so
     "closest",  # mean distance [m] to the closest obstacle or wall
-    "visibility",  # mean distance [m] to what is seen in `SIGHTS` directions
+    "visibility",  # mean distance [m] to the first disc or wall in `SIGHTS` directions
     "dispersion",  # changes between blocked and free around a point; the higher, the harder
     "dimension",  # mean of the least width [m] across a point, along 4 lines
-    "tortuosity",  # length of the path over that of its chord; the higher, the harder
+    "tortuosity",  # length of the path over its chord's; the higher, the harder
     "cost",  # without noise, of theta_init; the higher, the harder
     "slope",  # of the cost in theta_c; the higher, the harder
     "overshoot",  # alpha ||phi||^2 in the start; the higher, the harder
@@ -223,8 +223,8 @@ def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Seri
 DIFFICULTY = Investigation(
     name="population_layouts",
     parts={"before training": Part(of_layout, {"theta_init": ""}, tuple(LAYOUTS), 1, seconds=2)},
-    questions=(),  # those of `population` read the table
-    seed=lambda place, k: k,  # nothing is drawn
+    questions=(),  # the questions of `population` read the table
+    seed=lambda place, k: k,  # no row draws
     registered="46c248b",
     digits=9,
 )

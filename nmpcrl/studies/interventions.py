@@ -33,7 +33,7 @@ from nmpcrl.study.experiment import Experiment
 
 DRAW, SAMPLE = 41, 50  # the seed of the order; drawn layouts of which one run was made again first
 NUDGE = 1e-9
-ARMS = {  # the intervention, and what is added to theta_init
+ARMS = {  # the intervention, and the number added to theta_init
     "theta held": ("theta held", 0.0),
     "true slope": ("true slope", 0.0),
     "nudged": ("none", NUDGE),

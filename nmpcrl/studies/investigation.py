@@ -67,8 +67,8 @@ class Price(NamedTuple):
 class Part:
     """Every arm in every place with every seed.
 
-    Arms that depend on earlier rows, such as a tuned setting, are a function of the table of these,
-    which may raise a `Refusal` while it is incomplete.
+    Arms that depend on earlier rows, such as a tuned setting, are a function of the table of
+    earlier rows, which may raise a `Refusal` while it is incomplete.
     """
 
     run: Callable[[Any, str, int, int], Row]  #: (setting, place, episodes, seed)
@@ -78,7 +78,7 @@ class Part:
     seeds: int = 1
     begin: int = 0  #: k of the first seed
     at: Callable[[], Sequence[tuple[str, int]]] | None = None  #: place and k of rows, if no grid
-    deterministic: Collection[str] = ()  #: arms that draw nothing, one seed
+    deterministic: Collection[str] = ()  #: arms without random draws: one seed
     first: Mapping[str, int] = field(default_factory=dict)  #: arms of the first places only
     seconds: float = 0.03  #: of processor time an episode, as long as no row of the arm is known
 
@@ -149,7 +149,7 @@ class Investigation:
     registered: str = ""  #: the commit that fixed parts and questions, before the first row
     epoch: int = 1  #: raised by hand where an edit changes a number
     epochs: Mapping[str, int] = field(default_factory=lambda: EPOCHS)  #: of packages it rests on
-    libraries: Sequence[str] = ()  #: whose versions matter, beside those of every run
+    libraries: Sequence[str] = ()  #: further libraries whose versions change rows
     digits: int | None = None  #: to which published numbers are rounded
     arrays: Sequence[str] = ()  #: columns of lists, published in NAME.npz for the rows with one
     evidence: Callable[[pd.DataFrame], Any] = lambda table: table  #: that questions are asked of
@@ -171,11 +171,11 @@ class Investigation:
         return hash_of(depends)
 
     def table(self) -> pd.DataFrame:
-        """The published rows; a `Damaged` says what is wrong with them."""
+        """The published rows; `Damaged` if a file is missing or was changed."""
         return published.read(self.name, self.where)
 
     def _published(self) -> pd.DataFrame:
-        """The published rows; none where nothing is published."""
+        """The published rows; an empty table before the first publication."""
         known = published.about(self.name, self.where)
         return self.table() if known else pd.DataFrame(columns=NAMES)
 
@@ -184,7 +184,7 @@ class Investigation:
         return published.is_current(self.name, part, self.where, self.epochs)
 
     def known(self) -> pd.DataFrame:
-        """The published rows of these epochs, then the rows stored here that are not published."""
+        """The published rows of these epochs, then further rows stored here."""
         there = self._published()
         parts = [*filter(self.is_current, there.part.unique())]
         tables = [one for one in (there[there.part.isin(parts)], self.made()) if len(one)]
@@ -273,7 +273,7 @@ class Investigation:
         line = json.dumps([self.key(job[0]), sources_hash(), named, self.registered])
         try:
             with FileLock(f"{self.log}.lock"), self.log.open("a", encoding="utf-8") as file:
-                file.write(f"\n{line}")  # begins a line, whatever was cut off before
+                file.write(f"\n{line}")  # a new line, also after one that was cut off
         except OSError as error:
             raise unwritable(self.log, error) from error
 
@@ -437,7 +437,7 @@ def of_file(path: Path) -> Investigation:
 
 
 def _commit(path: Path, source: str) -> str:
-    """The commit since which a file has its present code; empty if that is not committed."""
+    """The commit since which a file has its present code; empty before a commit has it."""
 
     def git(*arguments: str) -> str:
         asked = ["git", "-C", str(path.parent), *arguments]

@@ -1,4 +1,8 @@
-"""The main study: runs of a chapter, published or trained here, and publication."""
+"""The main study: runs of a chapter, published or trained here, and publication.
+
+It is no `Investigation`: an `Experiment` of 26 fields names a row, the cost ratio and the failure
+mode of a row depend on the row of its frozen arm, and `runs.npz` has arrays of its own.
+"""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace

@@ -46,7 +46,7 @@ ARMS: Mapping[str, Callable[[Nmpc], Learner]] = {
     "TDC": lambda nmpc: learning.gradient_tdc(nmpc, 1e-4, 1e-4),
     "DPG": lambda nmpc: learning.policy_gradient(nmpc, 1e-3, every=100),
 }
-ROW: Row = {  # what a part does not measure
+ROW: Row = {  # the defaults of a row
     "test": np.nan,  # mean cost of a step without noise on the action, with the last theta
     "before": np.nan,  # J of ours in mpcrl's order
     "nudged": np.nan,  # the same from theta + `NUDGE`
@@ -110,7 +110,7 @@ def mean_cost(act: Callable[[Vector], Vector], test: tuple[int, int] = TEST) -> 
 
 
 def searched() -> Vector:
-    """The theta of the least mean cost that CMA-ES finds; it sees disturbances of its own."""
+    """The theta of the least mean cost that CMA-ES finds; its disturbances are not the test's."""
     import cma  # takes a second
 
     def cost(theta: Any) -> float:

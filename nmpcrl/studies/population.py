@@ -1,8 +1,8 @@
 """The runs in 180 drawn layouts: in how many each claim holds, and ten questions.
 
 Parts, expected shares, thresholds and questions, in `population.toml`, were committed before any
-run; a test compares them with that commit, whose file also says what each question measures and
-where yes ends. The question "extrapolation" is answered by `interventions`.
+run; a test compares them with that commit, whose file also has the measure of each question and
+its border. The question "extrapolation" is answered by `interventions`.
 
 The unit is a layout. A claim has several answers in a layout, one or two in each reading of the
 decay; it holds there if more than `MAJORITY` of them are yes. Shares of layouts are read by

@@ -1,8 +1,8 @@
 """21 learners, remedies and searches at equal interaction: what to try where learning fails.
 
 Settings, parts, the rule of the advice and questions, in `remedies.toml`, were committed before any
-entry was tuned or judged; the file of that commit says what each question measures, and which
-pilots were known.
+entry was tuned or judged; the file of that commit has the measure of each question, and the
+pilots known then.
 
 An entry begins from theta_init with 50 or 300 episodes a layout and seed. An entry with settings
 tries four of them in the layouts of `tune`, the default first; the one with the greatest gain is
@@ -14,7 +14,7 @@ bootstrap over layouts. J_best is the lowest cost in a CMA-ES of `YARDSTICK` rol
 share may exceed 1. Layouts where less than `LEAST_GAIN` of J_init can be gained have no share. A
 failed solve costs infinitely much.
 
-The part `best` searches for J_best. Its rows are not published: all others have J_best as a column.
+The part `best` searches for J_best, which all other rows have as a column.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -51,7 +51,7 @@ HALF = 0.5  # of the layouts; an entry that surely solves fewer is never advised
 DIGITS = 2  # of the ends of intervals that are compared
 NEARLY = 0.9  # of the possible gain, in "search nears the best"
 CONTROL = "frozen"  # the entry without advice
-NO_DIFFERENCE = "no difference shown"  # an interval that holds 0 confirms nothing in part
+NO_DIFFERENCE = "no difference shown"  # where the interval holds 0
 SECONDS = 0.013  # of processor time an episode, as long as no row of the entry is known
 _STEP_SIZES = tuple({"alpha": alpha} for alpha in (1e-7, 3e-8, 3e-7, 1e-6))
 _RADII = tuple({"radius": radius} for radius in (0.3, 0.1, 0.03, 1.0))
@@ -74,7 +74,7 @@ SETTINGS: Mapping[str, tuple[Mapping[str, float], ...]] = {  # beta keeps its ra
     "CMA-ES": tuple({"spread": spread} for spread in (0.3, 0.1, 0.05, 0.6)),
     "Bayes": tuple({"nearby": nearby} for nearby in (1.0, 0.5, 0.25, 2.0)),
 }
-CONTROLS = ("guarded-RDES", "control-RDES")  # of what a guard does
+CONTROLS = ("guarded-RDES", "control-RDES")  # of the effect of a guard
 DEAR = ("RDES", "DES", "GN-J", "undone-GN-J", "DPG")  # more than a second a layout at 50
 
 

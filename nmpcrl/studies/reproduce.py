@@ -4,7 +4,7 @@ Where code, versions and machine are the published ones, a run must be equal to 
 Elsewhere the cost of theta_init must agree to `EXACT`, and of `FEWEST` or more runs of one learner,
 layout and reading of the decay at least half must lie in the range of the published runs, widened
 on both sides by its width and by `SLACK`. If none of ten published runs failed and each fails with
-probability p, most of three fail in at most 1.2 % of all cases, whatever p is.
+probability p, most of three fail in at most 1.2 % of all cases, for any p.
 """
 
 from collections.abc import Iterable, Mapping
@@ -165,9 +165,9 @@ def _interleaved(groups: Iterable[Iterable[Experiment]]) -> list[Experiment]:
 def relock(known: Published, count: int, *, workers: int | None = None) -> Proof:
     """Train `count` runs afresh, and write the lock if all have the bits that locked code made.
 
-    A fresh run is compared with the published run, if such a machine made it, else with the run
-    that is stored here. In a raised epoch the lock is written, and nothing is trained. A `Refusal`
-    says which bit has changed, or what lacks a comparison.
+    A fresh run is compared with the published run, if a machine like this one made it, else with
+    the run that is stored here. In a raised epoch the lock is written without any training. A
+    `Refusal` names a changed bit, or the number of runs without a comparison.
     """
     if lock.locked()["epochs"] != provenance.EPOCHS:
         return Proof(lock.relock(), 0, 0)
@@ -197,7 +197,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Proof
 
 
 def _stored_by_lock(e: Experiment) -> RunSummary | None:
-    """The stored summary, if locked code made it on such a machine with such versions."""
+    """The stored summary, if locked code made it on a machine like this one with these versions."""
     one, here = SUMMARIES.read(e), (fingerprint(), provenance.environment())
     if one is None or one.facts.get("sources") not in lock.locks():
         return None

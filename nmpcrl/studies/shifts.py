@@ -53,7 +53,7 @@ def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]
 def fires(values: Sequence[float]) -> bool:
     """Whether Shewhart's chart fires on the last value: |x - mean| > LIMIT s, or x is nan.
 
-    Mean and standard deviation s are those of the `WINDOW` values before. Independent normal values
+    Mean and standard deviation s are over the `WINDOW` values before. Independent normal values
     fire falsely with a probability of 0.001.
     """
     *before, value = values[-WINDOW - 1 :]
@@ -74,7 +74,7 @@ class Recent(QNetwork):
 
     def draw(self) -> NDArray[np.intp]:
         """The numbers of the examples of a mini-batch; the last is the latest."""
-        first = max(len(self) - int(8 * AGE), 0)  # weights below exp(-8) are nothing
+        first = max(len(self) - int(8 * AGE), 0)  # weights below exp(-8) count as 0
         ages = np.arange(len(self) - first)[::-1]
         keys = self._rng.gumbel(size=ages.size) - ages / AGE
         return first + np.argpartition(keys, -paper.BATCH)[-paper.BATCH :]

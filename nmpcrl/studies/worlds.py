@@ -1,7 +1,7 @@
 """Obstacles that move, a wrong model, layouts that change, richer terminal costs: 28 questions.
 
 Parts, thresholds and questions, in `worlds.toml`, were committed before any row was made; a test
-compares them with that commit, whose files also say what each question measures and where yes ends.
+compares them with that commit, whose files also have the measure of each question and its border.
 
 A place (a scenario, a layout, a sequence of layouts) is the unit: seeds are averaged first, and
 intervals are over places. Two arms with one seed meet the same noise. Costs are of rollouts without
@@ -46,7 +46,7 @@ MISFIT = 0.05  # of theta_init's cost: the least that the pilot's theta_c saved
 ALIGNED = 0.9  # cosine of two steps that point the same way
 PROMPT = 10  # episodes: a change is noticed promptly within so many
 RARE = 0.01  # false alarms an episode, at most
-EACH = 50  # episodes of a layout in "every 50", which a change that is not noticed counts
+EACH = 50  # episodes of a layout in "every 50", the delay of a missed change
 RESAMPLES = 2000  # of the bootstrap over places
 
 VIEWS = ("known", "extrapolated", "frozen")

@@ -98,7 +98,7 @@ IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
 
 @dataclass(frozen=True)
 class Variant:
-    """One field with another value; the others are those of the main table."""
+    """One field with another value; all other fields are the main table's."""
 
     departure: str  #: its letter in `DEPARTURES`; "" where the main table follows the paper
     changed: str  #: the difference in words

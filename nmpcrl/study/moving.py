@@ -26,7 +26,7 @@ from nmpcrl.study import paper
 from nmpcrl.study.faults import NONE, Fault, robot
 
 TARGET, LOWER, UPPER = map(np.array, (paper.TARGET, paper.LOWER, paper.UPPER))
-TASK: Task = replace(paper.task(), obstacles=())  # its numbers are those of the charge
+TASK: Task = replace(paper.task(), obstacles=())  # start, target, box and `charge` of the robot
 CLEARANCE = 2.5  # d_rob + d_obs [m]
 PERIOD = 0.2  # [s] of a step
 STAGES = np.arange(paper.HORIZON + 1)  # of a plan

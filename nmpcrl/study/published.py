@@ -119,10 +119,10 @@ def write(
 
     Args:
         name: of the files, without a suffix.
-        table: all rows, with those of earlier batches.
+        table: all rows, the rows of earlier batches included.
         arrays: all arrays.
         batch: `provenance.made_here()`, and counts of the new rows.
-        registered: the commit of questions and settings; by default that of the published rows.
+        registered: the commit of questions and settings; by default the published rows'.
         earlier: batches whose rows stay; by default all. A batch without counts is dropped where
             the others count every row.
         where: the folder, by default the project's.

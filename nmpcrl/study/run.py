@@ -59,7 +59,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     others = [episode.solver for episode in made if episode.solver]
     facts = {
         "stopped": stopped,
-        "solver": [controller.solver.name, *others][-1],  # another where that is not to be had
+        "solver": [controller.solver.name, *others][-1],  # another where it is not installed
         "seconds": float(steps["seconds"].sum()),
         "final_cost": final_cost(table["cost"]),
     }

@@ -86,7 +86,7 @@ class Store(Generic[Value]):
     def fetch(self, named: Named, **options: Any) -> Value:
         """The run of an experiment or a trial: read if it is stored, otherwise made and stored.
 
-        `options` are those of `run`. A run that another solver had to solve is returned, and not
+        `options` are options of `run`. A run that another solver had to solve is returned, but not
         stored. StoreError says why no run can be stored.
         """
         value = self.read(named)

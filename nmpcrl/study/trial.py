@@ -24,7 +24,8 @@ STATED = ("learner", "seed", *COUNTS, "theta")  # fields that the records have
 class Trial:
     """One run with a user's own parts.
 
-    The key of the run holds all fields: after an edit of a function the run is trained again.
+    The key of the run holds all fields: after an edit of a function the run is trained again, where
+    a version raised by hand could be forgotten.
     Functions may be defined in a notebook. Generators and networks are made by `make`.
     ParameterError refuses a value that no key can be made of.
     """

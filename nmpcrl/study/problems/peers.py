@@ -1,6 +1,6 @@
 """`gros_zanon` in csnlp and mpcrl (F. Airaldi), which share no code with this package.
 
-Plan, plant and agent of `gros_zanon` are those of mpcrl's example of Q-learning: a step of Newton
+Plan, plant and agent of `gros_zanon` are mpcrl's example of Q-learning: a step of Newton
 for each transition, with the outer product of Q's gradient for a Hessian, and no exploration.
 """
 
