@@ -1,7 +1,7 @@
 """An investigation and runs that are killed forty times end with the numbers of an undisturbed one.
 
 A child process completes a reader's investigation, that of Chapter 9 with longer rows, and some
-runs. The child, one of its workers or all of them are killed at drawn moments, and the child is
+runs. The child, one of its workers or all of them are killed after a drawn number of stored values and a drawn time, and the child is
 started again. Nothing that is stored is lost or made again.
 """
 
@@ -24,7 +24,7 @@ from nmpcrl.studies.investigation import of_file
 from nmpcrl.study import fetch_all, sweep
 from nmpcrl.study.store import RUNS
 
-KILLS, LATEST = 40, 15.0  # how often, and when at the latest [s]
+KILLS = 40
 STUDY = sweep(learner=("ES", "frozen"), seed=range(6), episodes=10)
 PROGRAM = """
 import sys
@@ -71,6 +71,12 @@ def stored(runs: Path) -> dict[str, object]:
     return found | {path.name: path.stat().st_mtime_ns for path in runs.glob("*.npz")}
 
 
+def wait_for(child: subprocess.Popen, runs: Path, count: int) -> None:
+    """Wait until so many values are stored, or the child ends."""
+    while child.poll() is None and len(stored(runs)) < count:
+        time.sleep(0.02)
+
+
 def kill(child: subprocess.Popen, rng: np.random.Generator) -> None:
     """Kill the child, one of its processes, or all."""
     with suppress(ProcessLookupError, psutil.NoSuchProcess):
@@ -99,8 +105,10 @@ def test_forty_kills_lose_nothing_and_change_no_number(own, tmp_path, monkeypatc
         runs = tmp_path / f"runs {rounds}"
         child = child or begun(own, runs)
         before = stored(runs)
-        with suppress(subprocess.TimeoutExpired):
-            child.wait(rng.uniform(0, LATEST) if kills < KILLS else None)
+        if kills == KILLS:
+            child.wait()
+        wait_for(child, runs, len(before) + rng.integers(4))
+        time.sleep(rng.exponential(0.3))
         if child.poll() is None:
             kill(child, rng)
             kills += 1
