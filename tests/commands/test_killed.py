@@ -1,8 +1,8 @@
 """An investigation and runs that are killed forty times end with the numbers of an undisturbed one.
 
-A child process completes a reader's investigation, that of Chapter 9 with longer rows, and some
-runs. The child, one of its workers or all of them are killed after a drawn number of stored values and a drawn time, and the child is
-started again. Nothing that is stored is lost or made again.
+A child process completes the investigation of Chapter 9 with longer rows, and some runs. The child,
+one of its workers or all of them are killed after a drawn number of stored values and a drawn time,
+and the child is started again. No stored value is lost or made again.
 """
 
 import json
