@@ -1,8 +1,8 @@
 """Drawn rows of each published investigation, made afresh, are the published ones.
 
-On the machine that made them, all are; elsewhere learning may magnify a last bit: of 21 further rows
-of `worlds`, 6 differed on another machine. There, rows that are surely other ones are left out. A
-part is asked once its published rows are of the present epochs.
+On the machine that made them, all are. Elsewhere learning may magnify a last bit (of 21 further rows
+of `worlds`, 6 differed), and rows of networks and of `other_problems` are left out. A part is asked
+once its published rows are of the present epochs.
 """
 
 import numpy as np
