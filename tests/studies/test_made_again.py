@@ -1,6 +1,6 @@
 """Drawn rows of each published investigation, made afresh, are the published ones.
 
-On the machine that made them, all are. Elsewhere learning may magnify a last bit (of 21 further rows
+On the machine that made them, all are. Elsewhere learning may magnify a last bit (of 21 more rows
 of `worlds`, 6 differed), and rows of networks and of `other_problems` are left out. A part is asked
 once its published rows are of the present epochs.
 """
