@@ -56,7 +56,8 @@ def begun(own: Path, runs: Path) -> subprocess.Popen:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    child.stdout.readline()
+    with child.stdout as said:
+        said.readline()
     return child
 
 
