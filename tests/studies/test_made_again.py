@@ -1,8 +1,8 @@
 """Drawn rows of each published investigation, made afresh, are the published ones.
 
-On the machine that made them, all are, to the last published digit. Elsewhere learning may magnify a
-last bit: most are (of 21 further rows of `worlds`, 15), and rows of networks are left out. A part is
-asked once its published rows are of the present epochs.
+On the machine that made them, all are, to the last published digit. Elsewhere learning may magnify
+a last bit: most are equal (of 21 further rows of `worlds`, 15), and rows of networks are left out.
+A part is asked once its published rows are of the present epochs.
 """
 
 import numpy as np
