@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.vectors import floats
 
 
 class Named(dict[str, Any]):
@@ -58,7 +59,7 @@ class Blocks(Named):
     def filled(self, base: Matrix, values: Mapping[str, Any]) -> Matrix:
         """A copy of `base`, vectors along its last axis, with these arrays in their places."""
         copy = np.array(base, float)
-        for name, value in values.items():
+        for name, value in by_name(self._what, values).items():
             shape, whole = self[name], (*copy.shape[:-1], *self[name])
             array = numbers(f"{self._what} {name}", value, empty=0 in shape)
             if array.shape not in (shape, whole):
@@ -71,12 +72,16 @@ class Blocks(Named):
         return copy
 
 
+def by_name(what: str, values: Any) -> Mapping[str, Any]:
+    """The same; ValueError unless it has names."""
+    if isinstance(values, Mapping):
+        return values
+    raise ValueError(f"{what} = {values!r} must have names: write {{'name': numbers}}")
+
+
 def numbers(name: str, value: Any, *, empty: bool = False) -> Matrix:
     """An array of finite numbers, which may be `empty` where that is allowed; else ValueError."""
-    try:
-        array = np.array(value, float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} = {value!r} must be a number or an array of numbers") from None
+    array = floats(name, value)
     if not (array.size or empty) or not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r} must hold finite numbers")
     return array

@@ -27,7 +27,7 @@ from nmpcrl.control.solvers import Asked, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
-from nmpcrl.control.vectors import positive_integer
+from nmpcrl.control.vectors import floats, positive_integer
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
@@ -145,6 +145,9 @@ class Nmpc(Described):
             why, other = variant.diagnosis.why(state, theta, known), ""
             if not isinstance(variant.solver, Compiled):  # which asked fatrop itself
                 other = f"try solver={Riccati.name!r}, which begins in more ways"
+                box = self.problem.state_lower, self.problem.state_upper
+                if not self.problem.soft.all() or np.isfinite(box).any():
+                    other += ", and violates hard rows and bounds least where no plan keeps to them"
             said = "; ".join(filter(None, (error.status, why, other)))
             if said == error.status:
                 raise
@@ -317,10 +320,7 @@ class Nmpc(Described):
 
 def _checked(name: str, vector: Vector, size: int, largest: float) -> Vector:
     """A copy of a vector of this size with no number larger."""
-    try:
-        vector = np.array(vector, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} = {vector!r} must hold {size} numbers") from None
+    vector = floats(name, vector)
     if vector.shape != (size,):
         raise ValueError(f"{name} has shape {vector.shape}; it must be ({size},)")
     if not math.hypot(*vector) <= largest and not (np.abs(vector) <= largest).all():

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.blocks import numbers
+from nmpcrl.control.blocks import by_name, numbers
 from nmpcrl.control.content import Described
 from nmpcrl.control.expression import refuse_other
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.solution import Solution
+from nmpcrl.control.vectors import floats
 
 # of a `Problem`: a function of the time, or by name an array over the times of an episode
 Data = Callable[[int], Mapping[str, Any]] | Mapping[str, Any]
@@ -34,7 +35,7 @@ class Policy(Described):
         name an array over the times, as in `train`; those of the problem if absent.
         """
         self.nmpc, self.data = nmpc, data
-        self.theta = np.array(nmpc.problem.theta if theta is None else theta, float)
+        self.theta = floats("theta", nmpc.problem.theta if theta is None else theta)
         self.solution: Solution | None = None  # of the last call
         self.time = 0  # of the next call
         _ = self._ahead  # refuses data that are no such thing
@@ -113,9 +114,9 @@ def forecasts(data: Data | None, horizon: int) -> Callable[[int], dict[str, Any]
     if callable(data):
         refuse_other("data is called as data(t) and returns arrays by name", data, 1)
         return lambda t: {
-            "data": {name: numbers(f"data {name}", one) for name, one in data(t).items()}
+            "data": {k: numbers(f"data {k}", one) for k, one in by_name("data", data(t)).items()}
         }
-    series = {name: np.array(values, float) for name, values in data.items()}
+    series = {k: floats(f"data {k}", one) for k, one in by_name("data", data).items()}
     for name, values in series.items():
         if not values.ndim or not len(values):
             raise ValueError(f"data {name!r} must be an array with an axis of time in front")

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.blocks import Blocks, numbers
+from nmpcrl.control.blocks import Blocks, by_name, numbers
 from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import box, positive_integer, read_only, spread
@@ -48,7 +48,8 @@ class Soft:
     #: W > 0, a number, or one a row; or th -> W, a learned number: slacks are then in units of cost
     weight: Any = 1.0
     stages: Any = None  #: where they hold: an index, a slice or a list in 0, ..., N; all if None
-    each: str | None = None  #: a table in data: each of its lines has these rows, and is d[each]
+    #: a table in data, each line of which has these rows, and is d[each]; only they see it
+    each: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ class Problem(Described):
 
         The functions take SX and return SX: `x` and `u` are columns, `th["A"]` is the parameter A
         in its shape. With data, the last argument of every function is `d`: `d["price"]` is the
-        price of the stage.
+        price of the stage; a table of `Soft.each` alone is an argument of its rows alone.
 
         Args:
             states: n.
@@ -137,7 +138,8 @@ class Problem(Described):
             state_lower: least state of stages 1, ..., N, a hard bound; a number or one a state.
             state_upper: largest state.
             gamma: discount factor, 0 < gamma <= 1.
-            data: known numbers of the stages by name: an array for all stages, or a `Series`.
+            data: known numbers of the stages by name: an array for all stages, or a `Series` of one
+                for each; in an episode they are those of `data=` of `learn`, by name over its time.
             scale: typical sizes of the states, a number or one a state, used as units; by default
                 1, or sizes read from the costs where these lie below 0.01 or above 10,000.
         """
@@ -153,18 +155,19 @@ class Problem(Described):
         )
         self._take_theta(theta)
         rows = {**_rows("soft", soft, Soft), **_rows("hard", hard, Hard)}
+        known = by_name("data", data or {})
         named = {one.each for one in rows.values() if one.each is not None}
-        if len(named) > 1 or not named <= {*(data or {})}:
+        if len(named) > 1 or not named <= {*known}:
             raise ValueError(f"each = {sorted(named)} must name one table in data")
         family = next(iter(named), None)
-        self._take_data(data or {}, family)
+        self._take_data(known, family)
         self._write((model, stage, terminal, initial), rows, family)
         self.sizes = _sizes(scale, self)
 
     def _take_theta(self, theta: Mapping[str, Any]) -> None:
         """Set names, starts and bounds of the parameters."""
         starts, lower, upper = {}, [], []
-        for name, one in theta.items():
+        for name, one in by_name("theta", theta).items():
             given = one if isinstance(one, Parameter) else Parameter(one)
             starts[name] = start = numbers(f"theta {name}", given.start)
             low, high = (
@@ -360,12 +363,19 @@ class Problem(Described):
         return float(self._stage_of(x, u, theta, data)[1])
 
     def plant(self, **values: Any) -> Callable[..., tuple[Vector, float, bool]]:
-        """A plant that moves as this problem does with other parameters, at the plan's cost.
+        """A plant that moves as this problem does with other parameters; its cost has the starts.
 
-        learn(nmpc, plant=problem.plant(mass=1.3), start=[0.0]) is learning with a wrong mass.
+        learn(nmpc, plant=problem.plant(mass=1.3), start=[0.0]) is learning with a wrong mass. Where
+        the problem has data, the plant is told time and data, and moves and costs with them.
         """
         truth = self.vector(**values)
-        return lambda x, u, rng: (self.step(x, u, truth), self.cost(x, u), False)
+        if not self.data_names:
+            return lambda x, u, rng: (self.step(x, u, truth), self.cost(x, u), False)
+        return lambda x, u, rng, t, d: (
+            self.step(x, u, truth, data=d),
+            self.cost(x, u, data=d),
+            False,
+        )
 
     def _stage_of(self, x: Any, u: Any, theta: Any, data: Mapping[str, Any] | None) -> Any:
         theta = self.theta if theta is None else theta

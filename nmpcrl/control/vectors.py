@@ -1,8 +1,10 @@
 """Checked, read-only copies of a user's numbers."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nmpcrl import Vector
 
@@ -21,6 +23,17 @@ def positive_integer(name: str, number: Any) -> int:
     return int(number)
 
 
+def floats(name: str, value: Any) -> NDArray[np.float64]:
+    """A copy of numbers as an array; ValueError where there are none."""
+    try:
+        return np.array(value, float)
+    except (TypeError, ValueError):
+        advice = ": write problem.vector(...)" if isinstance(value, Mapping) else ""
+        raise ValueError(
+            f"{name} = {value!r} must be a number or an array of numbers{advice}"
+        ) from None
+
+
 def spread(
     name: str, value: Any, shape: tuple[int, ...], each: str, *, positive: bool = False
 ) -> Vector:
@@ -28,7 +41,7 @@ def spread(
 
     ValueError for another shape, for nan, and for numbers that are not `positive` and finite.
     """
-    array = np.array(value, float)
+    array = floats(name, value)
     kind = "positive numbers" if positive else "numbers"
     allowed = (array > 0) & (array < np.inf) if positive else ~np.isnan(array)
     if array.shape not in ((), (1,), shape) or not allowed.all():

@@ -17,6 +17,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Task
 from nmpcrl.control.expression import mismatch, refuse_other
+from nmpcrl.control.policy import Data, forecasts
 from nmpcrl.control.solution import short
 
 # next state, cost l(s, a), whether the episode ends there, and whether only its time does
@@ -39,6 +40,7 @@ def environment(
     nmpc: Nmpc | None,
     plant: Plant | StepFunction | GymnasiumEnv | None = None,
     start: Start | None = None,
+    data: Data | None = None,
 ) -> Environment:
     """The environment of an NMPC, checked.
 
@@ -48,10 +50,12 @@ def environment(
         plant: a `Plant`, whose cost is the task's; or (state, action, rng) -> (next state, cost,
             end), for any other, such as a disturbed one, with any cost and end of its own. A fourth
             value, if there is one, ends the episode in a state that keeps its worth. A function of
-            (state, action, rng, t) is told the time, the steps since the start. Or a
-            `gymnasium.Env`. The plant that plans if absent.
+            (state, action, rng, t) is told the time, the steps since the start; and one of (state,
+            action, rng, t, d) the data that a plan at t has, too. Or a `gymnasium.Env`. The plant
+            that plans if absent.
         start: a state, or rng -> state; the task's if absent. With the same start, no noise in the
             plant and no exploration, all seeds are one run: that they agree says nothing.
+        data: as in `train`.
 
     Raises:
         ValueError: plant or start is missing, as for a `Problem`, or does not fit the plan.
@@ -72,8 +76,10 @@ def environment(
         step = charged(plant, task, nmpc)
     else:
         own = cast(StepFunction, plant)
-        if callable(own) and mismatch(own, (None,) * 3) and not mismatch(own, (None,) * 4):
-            own, start = timed(own, start)
+        fits = [k for k in (3, 4, 5) if callable(own) and not mismatch(own, (None,) * k)]
+        if fits and 3 not in fits:
+            ahead = forecasts(data, nmpc.horizon if nmpc else 0)
+            own, start = timed(own, start, lambda t: (t, ahead(t).get("data"))[: fits[0] - 3])
         refuse_other(PLANT, own, 3)
         step = checked(own, states)
     if callable(start):
@@ -172,8 +178,10 @@ def of_gymnasium(
     return step, begin
 
 
-def timed(plant: Callable[..., Any], start: Start) -> tuple[StepFunction, Start]:
-    """A plant (state, action, rng, t) as one of three arguments, and a start that sets t to 0."""
+def timed(
+    plant: Callable[..., Any], start: Start, more: Callable[[int], tuple[Any, ...]]
+) -> tuple[StepFunction, Start]:
+    """A plant as one of three arguments, given `more(t)`, too, and a start that sets t to 0."""
     clock = count()
 
     def begin(rng: np.random.Generator) -> Any:
@@ -181,7 +189,7 @@ def timed(plant: Callable[..., Any], start: Start) -> tuple[StepFunction, Start]
         clock = count()
         return start(rng) if callable(start) else start
 
-    return lambda state, action, rng: plant(state, action, rng, next(clock)), begin
+    return lambda state, action, rng: plant(state, action, rng, *more(next(clock))), begin
 
 
 def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:

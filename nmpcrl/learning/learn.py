@@ -14,7 +14,7 @@ from nmpcrl.control import Nmpc, Policy
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.policy import Data
 from nmpcrl.control.solution import short
-from nmpcrl.control.vectors import spread
+from nmpcrl.control.vectors import floats, spread
 from nmpcrl.learning.batches import lstd_q
 from nmpcrl.learning.environment import GymnasiumEnv, StepFunction, stream
 from nmpcrl.learning.episode import Episode
@@ -40,6 +40,7 @@ NAMED: dict[str, Callable[..., Learner]] = {
 }  # fmt: skip
 DEVIATION = 0.05  # of the noise, in parts of the distance between the bounds of an input
 STRIDE = 0.3  # of LSTD-Q: the most by which an entry of theta moves at once, see `lstd_q`
+VIOLATED, SOME = 1e-6, 0.1  # of hard rows; of an episode's steps, above which `learn` warns
 CLIPPED = 0.1  # of the actions at each of both bounds of an input, above which `learn` warns
 
 
@@ -96,8 +97,9 @@ def learn(
     """Learn theta from episodes with noise: `learn(nmpc, plant=plant, start=[1, 0]).theta["mass"]`.
 
     It warns, once each, where a step size is so large that steps overshoot, where a weight of a
-    cost turns negative, and where the noise is clipped at both bounds of an input. A divergence is
-    no error: the result says so, with what was reached before.
+    cost turns negative, where an episode ends in a failed solve, where many plans violate hard
+    rows, and where the noise is clipped at both bounds of an input. A divergence is no error: the
+    result says so, with what was reached before.
 
     Args:
         nmpc: the controller whose theta is learned.
@@ -119,9 +121,12 @@ def learn(
         resume: what an earlier call reached, to go on from, with the same other arguments: 10 and
             10 episodes are 20, to the last bit. A learner with a network must be the same object.
     """
+    if not isinstance(nmpc, Nmpc):
+        raise ValueError(f"nmpc = {nmpc!r} must be an Nmpc: write learn(Nmpc(problem), ...)")
     base = _learner(nmpc, learner, options)
-    if not isinstance(confirm, int) or confirm < 0:
-        raise ValueError(f"confirm = {confirm!r} must be a whole number, 0 or more")
+    for name, number in (("confirm", confirm), ("seed", seed)):
+        if not isinstance(number, int | np.integer) or number < 0:
+            raise ValueError(f"{name} = {number!r} must be a whole number, 0 or more")
     if resume is not None and theta is not None:
         raise ValueError("a resumed run begins with its own theta: leave theta= out")
     if resume is not None and isinstance(resume.weights.memory, Best) != undo:
@@ -129,7 +134,7 @@ def learn(
     seed, done = (resume.seed, resume.episodes) if resume else (seed, 0)
     rng = deepcopy(resume.rng) if resume else stream(seed, 1)
     first = nmpc.problem.theta if theta is None else theta
-    weights = resume.weights if resume else Weights(np.array(first, float))
+    weights = resume.weights if resume else Weights(floats("theta", first))
     noise = _deviation(nmpc, deviation)
     explore = Exploration(episodes=episodes, steps=steps, deviation=noise, seed=seed, first=done)
     around: dict[str, Any] = {"plant": plant, "start": start, "data": data}
@@ -160,6 +165,8 @@ def learn(
             warnings.filterwarnings("ignore", "theta .* turned negative, and a cost")  # of a solve
             for one in by_episode(mover, nmpc, weights, explore, rng=rng, **around):
                 found.append(replace(one, number=done + one.number))
+                warn("failed", one.failure and f"episode {found[-1].number} ended: {one.failure}")
+                warn("violated", _violated(found[-1]))
                 warn("overshoot", _overshoot(base, found[-1]))
                 warn("negative", _negative(nmpc, least, found[-1]))
                 if not absurd(one.weights, nmpc.largest):
@@ -175,7 +182,8 @@ def learn(
         history[name] = np.concatenate([one.columns[name] for one in found])
     if resume:
         history = {k: np.concatenate([resume.history[k], v]) for k, v in history.items()}
-    at = [(history["action"] == side).mean(axis=0) for side in (nmpc.lower, nmpc.upper)]
+    acted = history["action"]
+    at = [(acted == side).sum(axis=0) / max(len(acted), 1) for side in (nmpc.lower, nmpc.upper)]
     if (np.minimum(*at) > CLIPPED).any():
         warn("clipped", f"shares of {short(at[0])} and {short(at[1])} of the actions lie at the"
              f" lower and upper bounds, where noise is clipped: deviation={short(noise)} may be too"
@@ -216,6 +224,19 @@ def _deviation(nmpc: Nmpc, given: Any) -> Vector:
                 " noise: give deviation=, a number or one an input"
             )
     return spread("deviation", given, (nmpc.m,), "an input")
+
+
+def _violated(episode: Episode) -> str:
+    """The warning of plans that violate hard rows or bounds; "" where few do."""
+    found = np.nan_to_num(episode.columns["violation"]) > VIOLATED
+    share = found.sum() / max(len(found), 1)
+    if not share > SOME:
+        return ""
+    return (
+        f"in {share:.0%} of the steps of episode {episode.number} no plan keeps to all hard rows"
+        " and bounds, and features there are those of the violation, which leave little to learn:"
+        " write what noise may leave as Soft(row, weight=...)"
+    )
 
 
 def _overshoot(learner: Learner, episode: Episode) -> str:

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
+from nmpcrl.control.expression import refuse_other
 from nmpcrl.learning.baselines import as_far_as
 from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.learners import (
@@ -178,6 +179,7 @@ def scheduled(learner: Learner, part: Callable[[int], float]) -> Learner:
 
     scheduled(q_learning(nmpc, 1e-3), lambda k: 1 / (1 + k / 500)) is Robbins and Monro's (1951).
     """
+    refuse_other("part is called as part(k) and returns a number", part, 1)
     return wrapped(learner, "scheduled", Scheduling(learner.bounded_rule, part))
 
 

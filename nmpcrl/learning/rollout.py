@@ -56,7 +56,7 @@ def evaluate(
         plant: as in `train`, like `start`, `data` and `rng`, of which an int gives other numbers.
     """
     nmpc, rng = nmpc_of(controller), stream(rng, 2)
-    around = environment(nmpc, plant, start)
+    around = environment(nmpc, plant, start, data)
     state, plan, failure = around.start(rng), None, ""
     states, actions, costs = [], [], []
     ahead = forecasts(data, nmpc.horizon if nmpc else 0)

@@ -216,7 +216,7 @@ class Trainer:
             weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float)
         )
         self.clipped, self.constrained, self.rng = clipped, constrained, stream(rng, 1)
-        self.environment = environment(nmpc, plant, start)
+        self.environment = environment(nmpc, plant, start, data)
         self.ahead = forecasts(data, nmpc.horizon)  # the options of a solve at t
         plant = nmpc.plant if plant is None else plant
         self.plant = plant if isinstance(plant, Plant) else None  # the environment, if it is one

@@ -89,8 +89,10 @@ ABSURD = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf, r"(e\+07|10000000)": 1e
           for i, number in ((0, 0.61), (0, -0.61), (1, 1.58), (1, -1.58))),
         ({"state": START[:2]}, r"state has shape \(2,\); it must be \(3,\)"),
         ({"theta": THETA[:8]}, r"theta has shape \(8,\); it must be \(9,\)"),
-        ({"state": ["x", "y", "z"]}, r"state = \['x', 'y', 'z'\] must hold 3 numbers"),
-        ({"theta": [[1.0], [1.0, 2.0]]}, "theta = .* must hold 9 numbers"),
+        ({"state": ["x", "y", "z"]}, r"state = \['x', 'y', 'z'\] must be a number or an arr"),
+        ({"theta": [[1.0], [1.0, 2.0]]}, "theta = .* must be a number or an array of numbers$"),
+        ({"theta": {"alpha": 1.0}}, r"theta = {'alpha': 1.0} must .* write problem.vector\(...\)"),
+        ({"data": 1.0}, "data = 1.0 must have names"),
         ({"data": {"wind": 1.0}}, r"data has no 'wind' \(it has target, discs\)"),
     ],
 )  # fmt: skip

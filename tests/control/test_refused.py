@@ -60,6 +60,8 @@ def robot(**changes) -> Nmpc:
         ({"stage": lambda x, u, th: x}, "stage returns 2 numbers; it must return 1 cost"),
         ({"terminal": lambda x, u, th: 0}, r"terminal is called as terminal\(x, th\)"),
         ({"theta": {}}, "theta is empty"),
+        ({"theta": [1.0]}, r"theta = \[1.0\] must have names: write {'name': numbers}"),
+        ({"data": [1.0]}, r"data = \[1.0\] must have names"),
         ({"theta": {"alpha": "one"}}, "theta alpha = 'one' must be a number or an array"),
         ({"theta": {"alpha": math.nan}}, "theta alpha = nan must hold finite numbers"),
         ({"theta": {"alpha": Parameter(1, 2, 3)}}, "theta 'alpha' starts at 1.0, outside"),

@@ -23,7 +23,7 @@ def test_step_cost_and_plant_are_the_problem_s_with_numbers_and_each_line_has_it
         assert problem.step(x, u, theta, data=data) == pytest.approx(later, rel=1e-13, abs=1e-13)
         assert problem.cost(x, u, theta, data=data) == pytest.approx(cost, rel=1e-13)
     problem, x, u = pendulum(), [0.3, 0.9], [0.5]
-    later, cost, end = problem.plant(rate=1.7)(np.array(x), np.array(u), None)
+    later, cost, end = problem.plant(rate=1.7)(np.array(x), np.array(u), None, 0, None)
     assert later.tolist() == problem.step(x, u, problem.vector(rate=1.7)).tolist()
     assert later.tolist() != problem.step(x, u).tolist()
     assert (cost, end) == (problem.cost(x, u), False)

@@ -137,6 +137,19 @@ def test_a_plan_sees_the_data_of_its_stages(tank):
     np.testing.assert_array_equal(rollout.actions, same.actions)
 
 
+@pytest.mark.parametrize("data", [{"price": PRICES}, lambda t: {"price": PRICES[t]}])
+def test_a_problems_plant_costs_what_the_data_of_its_time_say(tank, data):
+    plant, theta = tank.problem.plant(), tank.problem.theta
+    rollout = evaluate(tank, theta, 4, plant=plant, start=[0.2], data=data)
+    pairs = zip(rollout.states, rollout.actions, PRICES[:4], strict=True)
+    costs = [tank.problem.cost(x, u, data={"price": price}) for x, u, price in pairs]
+    assert rollout.costs.tolist() == costs
+    run_alone = [step.cost for step in run(frozen(tank), tank, noise(1, 4, 1, deviation=0.0),
+                                           plant=plant, start=[0.2], data=data)]  # fmt: skip
+    assert run_alone == costs
+    assert len({*costs}) == 4
+
+
 @pytest.mark.parametrize("constrained", [False, True])
 def test_the_next_state_is_valued_with_the_data_of_the_next_time(tank, constrained):
     es, how = expected_sarsa(tank, 1e-3), SELLING | {"constrained": constrained}

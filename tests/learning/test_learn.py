@@ -9,6 +9,7 @@ import pytest
 
 from nmpcrl.control import Nmpc, Parameter, Problem
 from nmpcrl.learning import (
+    Episode,
     Exploration,
     Learner,
     SecondSolve,
@@ -19,8 +20,10 @@ from nmpcrl.learning import (
     learn,
     lstd_q,
     q_learning,
+    scheduled,
     train,
 )
+from nmpcrl.learning.learn import _violated
 
 
 def problem(**changes) -> Problem:
@@ -93,6 +96,24 @@ def test_a_run_goes_on_to_the_last_bit_in_another_process_too(nmpc, undo):
     assert seen == [3, 4, 5] * 2
     assert half.episodes == 3
     assert len(whole.costs) == 4
+
+
+def test_an_episode_that_failed_is_told_once_and_a_theta_of_no_use_without_other_warnings(nmpc):
+    away = {"plant": lambda x, u, rng: (x * np.nan, 0.0, False), "start": [0.0]}
+    with pytest.warns(UserWarning, match=r"^episode 0 ended: no plan can begin in .*nan") as found:
+        result = learn(nmpc, episodes=3, **away)
+    assert [str(one.message) for one in found] == [*result.warnings]
+    absurd = learn(nmpc, theta=[1e9, 1, 0], episodes=2, **WORLD)
+    assert absurd.diverged.startswith("theta = [1.e+09")
+
+
+def test_plans_that_violate_hard_rows_are_told_where_they_are_many():
+    shares = {"violation": np.array([0.0, 2e-3, np.nan, 1e-9, 0.5, 0.1, 0.1, 0.1, 0.1, 0.2])}
+    assert _violated(Episode(3, shares, Weights(np.ones(1)))).startswith(
+        "in 70% of the steps of episode 3 no plan keeps to all hard rows"
+    )
+    shares["violation"][:-1] = 0
+    assert not _violated(Episode(3, shares, Weights(np.ones(1))))
 
 
 def test_a_divergence_a_long_step_and_noise_that_is_clipped_are_told_with_their_numbers(nmpc):
@@ -179,6 +200,10 @@ def test_a_plant_is_told_the_time_since_the_start(nmpc):
         ("LSTD-Q", {"confirm": -1}, "confirm = -1 must be a whole number, 0 or more"),
         ("LSTD-Q", {"deviation": [0.1, 0.2]}, r"deviation = .* must hold 1 numbers, one an input"),
         ("LSTD-Q", {"deviation": -1.0}, "must be a finite number, 0 or more"),
+        ("LSTD-Q", {"seed": None}, "seed = None must be a whole number, 0 or more"),
+        ("LSTD-Q", {"theta": {"gain": 1.0}}, r"theta = .'gain': 1.0. must .* problem.vector\("),
+        ("LSTD-Q", {"data": [1.0]}, r"data = \[1.0\] must have names"),
+        ("LSTD-Q", {"data": lambda t: [1.0]}, r"data = \[1.0\] must have names"),
     ],
 )
 def test_what_cannot_be_learned_is_refused(nmpc, learner, given, said):
@@ -195,5 +220,9 @@ def test_options_need_a_name_noise_needs_bounds_and_a_resumed_run_has_its_theta(
     done = learn(nmpc, episodes=1, steps=2, **WORLD)
     with pytest.raises(ValueError, match="leave theta= out"):
         learn(nmpc, theta=[1, 1, 0], resume=done, **WORLD)
+    with pytest.raises(ValueError, match=r"write learn\(Nmpc\(problem\), ...\)"):
+        learn(problem(), **WORLD)
+    with pytest.raises(ValueError, match=r"part is called as part\(k\)"):
+        scheduled(q_learning(nmpc, 1e-3), 0.5)
     with pytest.raises(ValueError, match="the run to resume had undo=False"):
         learn(nmpc, undo=True, resume=done, **WORLD)
