@@ -166,15 +166,20 @@ def assert_published(runs: dict, layout: str) -> None:
         np.testing.assert_array_equal(theta[1:], one.episodes["theta"])
 
 
-def test_a_page_is_given_one_seed_and_a_file_has_every_run_of_a_layout():
+@pytest.mark.parametrize(
+    "layouts", [("D",), pytest.param(design.LAYOUTS, marks=pytest.mark.slow)], ids=len
+)
+def test_a_page_is_given_one_seed_and_a_file_has_every_run_of_a_layout(layouts, monkeypatch):
+    """To compress a layout takes seconds."""
     shown = unpacked(given("runs")["given"])
     learners, decays = ("DES", "RDES", "frozen"), ("step", "episode")
     assert set(shown) == {(learner, decay, 0) for learner in learners for decay in decays}
     assert_published(shown, "A")
+    monkeypatch.setattr(published_runs, "LAYOUTS", layouts)
     files = published_runs.scripts()
-    assert list(files) == [f"runs_{layout}.js" for layout in design.LAYOUTS]
+    assert list(files) == [f"runs_{layout}.js" for layout in layouts]
     parts = (*design.main_table(), *design.controls())
-    for layout, text in zip(design.LAYOUTS, files.values(), strict=True):
+    for layout, text in zip(layouts, files.values(), strict=True):
         runs = unpacked(json.loads(re.search(rf"{layout}: (.*) }};", text)[1]))
         assert set(runs) == {(e.learner, e.decay, e.seed) for e in parts if e.layout == layout}
         assert_published(runs, layout)
