@@ -3,7 +3,7 @@
 import os
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -15,7 +15,6 @@ import pytest
 import tenths
 from hypothesis import settings
 
-from nmpcrl.claims.published import Evidence
 from nmpcrl.control import differential_drive
 from nmpcrl.study import jobs, paper
 
@@ -192,9 +191,3 @@ def robot_module() -> bytes:
 def timings() -> pd.DataFrame:
     """Times that nobody measured, with each solver."""
     return builders.timings(width=0.01, solvers=tuple(builders.SOLVERS))
-
-
-@pytest.fixture(scope="session")
-def made_up() -> Callable[..., Evidence]:
-    """Makes evidence, as `builders.evidence_of` says."""
-    return builders.evidence_of

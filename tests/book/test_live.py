@@ -7,16 +7,12 @@ import pytest
 from driver.page import live
 
 
-def notebook_of(*outputs: str) -> nbformat.NotebookNode:
-    """A notebook whose only cell displayed this HTML."""
-    shown = [nbformat.v4.new_output("display_data", {"text/html": html}) for html in outputs]
-    return nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("x", outputs=shown)])
-
-
 def figure_of(style: str, script: str) -> nbformat.NotebookNode:
+    """A notebook whose only cell displayed a figure with these files."""
     files = (("style", "live.css", style), ("script", "solver.js", script))
-    form = '<{0} data-file="{1}">\n{2}\n</{0}>'
-    return notebook_of("\n".join(form.format(*file) for file in files))
+    html = "\n".join('<{0} data-file="{1}">\n{2}\n</{0}>'.format(*file) for file in files)
+    shown = [nbformat.v4.new_output("display_data", {"text/html": html})]
+    return nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("x", outputs=shown)])
 
 
 def test_what_is_inline_becomes_a_link_to_a_file_that_pages_share_if_it_is_the_same(tmp_path):

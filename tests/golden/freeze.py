@@ -77,6 +77,7 @@ again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
 every = cache(lambda: main_study.gather("published", variants=True))
 six_paths = cache(lambda: every().paths)
+gap = cache(lambda: drawn_report.at_the_gap(drawn()))
 
 
 def verdicts() -> Any:
@@ -106,12 +107,6 @@ def other_borders() -> Any:
     return known
 
 
-def costs_less_than_ges() -> Any:
-    others, main = ("ES", "DES", "RDES", "TDC"), study().main.runs
-    functions = (own_claims.costs_less, own_claims.costs_less_anew)
-    return {name: [one(main, name, "GES") for one in functions] for name in others}
-
-
 def answers_of_thresholds() -> Any:
     names = ("was_stopped", "worsens", "improves", "solved", "cost_reduction", "late_cost_range")
     names += ("divergence", "instability")
@@ -138,22 +133,12 @@ def shares_in_a_to_f() -> Any:
     return population.shares(where).set_index("claim")
 
 
-def answers() -> Any:
-    found = population.POPULATION.judge(drawn())
-    return {name: answer for name, answer in found.items() if name != "cliff"}
-
-
 def predictors() -> Any:
     parts, layouts = drawn().runs.groupby("part"), drawn().layouts
     tuned, judged = population.succeeds(parts.get_group("tune")), population.succeeds(drawn().main)
     found = predictor_scores(layouts, tuned, judged)
     fitted = ("slope", "brier")  # of which BFGS finds no more digits
     return found.assign(**{name: [plain(one, ROLLOUT) for one in found[name]] for name in fitted})
-
-
-def at_the_gap() -> Any:
-    ends = drawn_report.at_the_gap(drawn())
-    return {"runs": table(ends), "improve": drawn_report.improve_by_gap(ends)}
 
 
 def whole_picture_tried() -> Any:
@@ -198,11 +183,6 @@ def means_in_worlds() -> Any:
     return found
 
 
-def costs() -> Any:
-    return {arm: [interquartile_mean(tests, ["all"] * len(tests)), table(tests)]
-            for arm, tests in problems().tests.items()}  # fmt: skip
-
-
 # What names a run: no edit may change a key, or stored runs would be trained again.
 
 
@@ -244,7 +224,11 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
         "constraints without noise": lambda: paper_claims.kept_without_noise(
             every().main.runs, PAPER
         ).groupby(level="learner", sort=False).agg(["sum", "size"]),
-        "costs less than GES": costs_less_than_ges,
+        "costs less than GES": lambda: {
+            name: [one(study().main.runs, name, "GES")
+                   for one in (own_claims.costs_less, own_claims.costs_less_anew)]
+            for name in ("ES", "DES", "RDES", "TDC")
+        },
     },
     "study": {
         "robustness map": lambda: robustness.robustness_map(every().runs, six_paths()).set_index(
@@ -273,13 +257,18 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
         "shares": lambda: drawn().shares.set_index("claim"),
         "shares in A to F": shares_in_a_to_f,
         "where each claim holds": lambda: table(population.by_layout(drawn().main, drawn().paths)),
-        "answers": answers,
+        "answers": lambda: {
+            name: answer for name, answer in population.POPULATION.judge(drawn()).items()
+            if name != "cliff"
+        },
         "the cliff": lambda: plain(population.cliff(population.raised()), RAISED),
         "early overshoot in A to F": lambda: population.early_overshoot(study().main.runs),
         "extrapolation": lambda: interventions.INTERVENTIONS.judge(again()),
         "the raised costs": lambda: plain(population.raised(), RAISED),
         "predictors": predictors,
-        "at the gap": at_the_gap,
+        "at the gap": lambda: {
+            "runs": table(gap()), "improve": drawn_report.improve_by_gap(gap()),
+        },
         "whole picture tried": whole_picture_tried,
         "runs made again": runs_made_again,
     },
@@ -321,7 +310,10 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
         "drawn scenarios": lambda: short(plain(SCENARIOS)),
     },
     "problems": {
-        "costs": costs,
+        "costs": lambda: {
+            arm: [interquartile_mean(tests, ["all"] * len(tests)), table(tests)]
+            for arm, tests in problems().tests.items()
+        },
         "predictions": lambda: other_problems.OTHER_PROBLEMS.answers(
             other_problems.OTHER_PROBLEMS.table()
         ),

@@ -65,16 +65,13 @@ P = value(K)
 SLOPE = 2 * (GAMMA * B.T @ P @ (A - B @ K) - R @ K)  # dQ / da in a = -K s, times s
 
 
-def test_the_critic_has_the_value_and_the_slope_of_the_action_value():
+def test_the_critic_has_value_and_slope_of_the_action_value_and_a_step_goes_down_it():
     means = means_of(pairs())
     v = lstd_value(means, 0.0)
     curvature = float((R + GAMMA * B.T @ P @ B).item())
     expected = [E**2 * curvature / (1 - GAMMA), 0, 0, P[0, 0], 2 * P[0, 1], P[1, 1]]
     np.testing.assert_allclose(v, expected, atol=1e-7)
     np.testing.assert_allclose(lstd_advantage(means, v, 0.0), -SLOPE.ravel(), atol=1e-7)  # psi -s e
-
-
-def test_a_step_goes_down_the_mean_of_the_policys_slope_times_that_of_the_value():
     learner, weights = policy_gradient(Gain(), 0.1, regularisation=0.0), Weights(K.ravel())
     for step in pairs():
         weights = learner.step(weights, step).weights

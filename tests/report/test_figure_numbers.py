@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from builders import evidence_of as made_up
 from matplotlib.colors import to_rgba
 
 from nmpcrl.analysis.statistics import Estimate, rate
@@ -60,7 +61,7 @@ def points(axes) -> np.ndarray:
 
 
 @pytest.mark.parametrize("claim", ["C1", "C2", "C5", "C6", "C7", "C9"])
-def test_a_claim_s_shares_are_those_of_its_verdict_with_wilson_s_interval(made_up, claim):
+def test_a_claim_s_shares_are_those_of_its_verdict_with_wilson_s_interval(claim):
     verdict, figure = drawn(claim, made_up(in_one_layout))
     panel = figure.axes[-1]
     labels = [tick.get_text() for tick in panel.get_yticklabels()]
@@ -77,7 +78,7 @@ def test_a_claim_s_shares_are_those_of_its_verdict_with_wilson_s_interval(made_u
     assert f" in {yes} of {of} " in figure.finding
 
 
-def test_stopped_runs_are_drawn_beyond_all_others_and_a_median_is_one_of_the_runs(made_up):
+def test_stopped_runs_are_drawn_beyond_all_others_and_a_median_is_one_of_the_runs():
     unlike = {True: {"reached": 40}, False: {"training": 2.0}}
     found = made_up(lambda e: unlike[e.seed == 0] if e.learner == "DES" else {})
     panel = drawn("C1", found)[1].axes[0]
@@ -93,7 +94,7 @@ def test_stopped_runs_are_drawn_beyond_all_others_and_a_median_is_one_of_the_run
     assert {*np.round(medians, 9)} <= {*points(panel)[:, 1].round(9)}
 
 
-def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
+def test_pairs_alike_lie_in_the_box_and_states_in_an_obstacle_are_counted_by_size():
     aside = made_up().summaries[Experiment("RDES")].states.copy()
     aside[2, 1] -= 1.0
     found = made_up(lambda e: {"states": aside, "end": 0.8} if e.learner == "RDES" else {})
@@ -102,9 +103,6 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
         assert len(points(panel)) == PAIRS / 2
         assert (points(panel) <= box).all()
     np.testing.assert_allclose(points(drawn("C5", found)[1].axes[0]), [[1.0, 0.1]] * 8)
-
-
-def test_states_in_an_obstacle_are_counted_by_size(made_up):
     found = made_up(lambda e: {"inside": (3, 2, 1)} if e.learner == "GES" else {})
     training, judged, _ = drawn("C7", found)[1].axes
     assert [text.get_text() for text in training.texts] == ["0"] * 9 + ["48", "32", "16"]
@@ -112,7 +110,7 @@ def test_states_in_an_obstacle_are_counted_by_size(made_up):
     assert len(points(training)) == len(points(judged)) == 4 * 3 * PAIRS
 
 
-def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stopped(made_up):
+def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stopped():
     found = made_up(lambda e: {"reached": 40} if e.learner == "DES" and e.seed == 0 else {})
     curves = {one.get_label(): one.get_ydata() for one in claims.learners(found, "").axes[1].lines}
     assert (curves["ES"][0], curves["DES"][0]) == (1.0, 1 - 1 / SEEDS)
@@ -130,7 +128,7 @@ def test_a_bar_is_as_long_as_the_ratio_that_a_verdict_on_time_rests_on(timings, 
     assert [bar.get_x() + bar.get_width() for bar in rest] == pytest.approx([*chosen.ratio])
 
 
-def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up):
+def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending():
     changes = {"DES": {"end": 1.2, "alpha_phi2": 3.0}, "RDES": {"end": 1.2}}
     found = made_up(lambda e: {"reached": 40} if (e.learner, e.seed) == ("RDES", 0)
                     else changes.get(e.learner, {}))  # fmt: skip
@@ -150,7 +148,7 @@ def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up)
 # The paper's figures
 
 
-def test_costs_are_in_units_of_the_start_and_infinite_where_a_run_was_cut_short(made_up):
+def test_costs_are_in_units_of_the_start_and_infinite_where_a_run_was_cut_short():
     run = next(iter(made_up(lambda e: {"end": 0.8, "training": 1.5}).summaries.values()))
     np.testing.assert_allclose(results.trained(run)[1], 1.5)
     np.testing.assert_allclose(results.judged(run)[1], [1.0, *[0.8] * 30])
@@ -166,7 +164,7 @@ def curves(found, pair=("DES", "RDES"), layout="A"):
     return results.learning_curves(found, pair, layout, thresholds.divergence, "diverged")
 
 
-def test_a_curve_off_the_scale_is_in_its_strip_and_a_band_holds_the_middle_half(made_up):
+def test_a_curve_off_the_scale_is_in_its_strip_and_a_band_holds_the_middle_half():
     found = made_up(lambda e: {"training": 2.0, "reached": 150 if e.decay == "episode" else None}
                     if (e.learner, e.layout) == ("DES", "A") else {})  # fmt: skip
     figure = curves(found)
@@ -185,7 +183,7 @@ def test_a_curve_off_the_scale_is_in_its_strip_and_a_band_holds_the_middle_half(
     assert panel.get_lines()[0].get_ydata()[-1] == pytest.approx(0.8)
 
 
-def test_endings_and_inputs_beyond_bounds_are_counted_and_stopped_runs_not_drawn(made_up):
+def test_endings_and_inputs_beyond_bounds_are_counted_and_stopped_runs_not_drawn():
     stuck = made_up().summaries[Experiment("RDES")].states.copy()
     stuck[2:] = stuck[1]
     changes = {("RDES", 0): {"states": stuck}, ("RDES", 1): {"reached": 50}}
@@ -198,7 +196,7 @@ def test_endings_and_inputs_beyond_bounds_are_counted_and_stopped_runs_not_drawn
         assert f"; {count} inputs leave their" in results.controls(evidence, "A").finding
 
 
-def test_every_known_run_has_its_mark_and_what_is_beyond_lies_at_the_edge(made_up):
+def test_every_known_run_has_its_mark_and_what_is_beyond_lies_at_the_edge():
     found = made_up()
     values = pd.Series(0.0, found.runs.index)
     es, ges = (found.runs.index[found.runs.learner == name] for name in ("ES", "GES"))
@@ -228,7 +226,7 @@ def test_only_narrow_gaps_are_drawn_from_centre_to_centre_and_name_the_layout():
     assert panel.get_title("left") == "A: open, +0.01 m"
 
 
-def test_the_map_has_a_frame_and_an_arrow_for_every_change(made_up):
+def test_the_map_has_a_frame_and_an_arrow_for_every_change():
     found = made_up(in_one_layout)
     rows = robustness_map(found.runs, found.paths)
     panel = layouts.verdict_map(rows, "Some change", "").axes[0]
@@ -237,7 +235,7 @@ def test_the_map_has_a_frame_and_an_arrow_for_every_change(made_up):
     assert len(frames) == len(arrows) == rows.changes.sum() > 0
 
 
-def test_thresholds_are_drawn_where_they_were_fixed_and_a_verdict_is_kept_between_two(made_up):
+def test_thresholds_are_drawn_where_they_were_fixed_and_a_verdict_is_kept_between_two():
     found = made_up()
     values = {claim: one.measure(found.runs, found.paths) for claim, one in BY_RUNS.items()}
     for panel, claim in zip(layouts.borders(values, "").axes, BY_RUNS.values(), strict=False):

@@ -69,7 +69,7 @@ def test_without_a_compiler_or_scripts_there_is_a_sentence(figure, tmp_path, mon
     assert FIGURES[figure]().data == said
 
 
-def test_the_problem_is_the_one_that_the_controller_solves():
+def test_the_problem_is_the_controller_s_and_each_slider_has_a_step_at_its_first_value():
     """But for the longest horizon and an obstacle, of which a page makes what is asked."""
     shown, own = given("controller")["problem"], alone.problem(NMPC.problem)
     for name in ("lower", "upper", "sides", "tie", "states", "inputs", "theta", "tolerance"):
@@ -82,9 +82,6 @@ def test_the_problem_is_the_one_that_the_controller_solves():
     for active in (False, True):
         here = Nmpc(NMPC.plant, NMPC.task, horizon=7, ties_active=active)
         assert problem_of(here)["tie"] == here.ocp.tie
-
-
-def test_each_slider_has_a_step_at_its_first_value():
     data, chain = given("controller"), given("chain")
     first = dict(zip(data["names"], data["theta"], strict=True)) | {"horizon": data["horizon"]}
     for values, of in ((first, data["ranges"]), (chain["given"], chain["ranges"])):

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
+from builders import evidence_of as made_up
 
 from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.analysis.statistics import Estimate
@@ -77,7 +78,7 @@ def test_a_drawn_claim_has_count_interval_outcome_and_what_was_expected():
     assert [*row] == ["38 of 40: 95% [83%, 99%]", "39 of 40", REPRODUCED, "85% to 97%"]
 
 
-def test_runs_are_split_by_whether_theta_c_has_closed_a_gap_where_there_is_one(made_up):
+def test_runs_are_split_by_whether_theta_c_has_closed_a_gap_where_there_is_one():
     names = ["J001", "J002", "J003"]
     found = made_up(layouts=tuple(JUDGE[name] for name in names), seeds=(0,))
     runs = found.runs.assign(part="judge", theta_8=0.2, distance=0.0)

@@ -20,7 +20,7 @@ def test_all_stopped_runs_are_made_again_beginning_with_one_of_each_of_50_drawn_
     assert len({place for place, _ in drawn[:50]}) == 50
 
 
-def test_a_nudged_run_starts_a_little_beside_theta_init(monkeypatch):
+def test_a_nudged_run_starts_beside_theta_init_and_a_difference_pairs_runs(monkeypatch):
     watched = []
 
     def watch(experiment, intervention):
@@ -32,9 +32,6 @@ def test_a_nudged_run_starts_a_little_beside_theta_init(monkeypatch):
     assert rows == [{"episodes": 1}] * 3
     assert watched[:2] == [("D", 3, 1.0, "theta held"), ("D", 3, 1.0, "true slope")]
     assert watched[2] == ("D", 3, pytest.approx(1 + 1e-9, abs=1e-12), "none")
-
-
-def test_a_share_draws_layouts_and_a_difference_pairs_runs():
     ends = {("A", 0): (300, 20), ("A", 1): (300, 299), ("B", 0): (10, 5)}
     rows = [{"part": "six", "arm": arm, "place": place, "k": k, "episodes": one}
             for (place, k), both in ends.items()

@@ -104,7 +104,7 @@ def test_a_weaker_question_counts_in_drawn_layouts_as_it_does_in_a_to_f(overlap,
         assert verdict.settled(Observations(runs)).outcome == outcome
 
 
-def test_the_measure_that_tells_success_is_ahead_of_noise(measures):
+def test_the_measure_that_tells_success_is_ahead_of_noise_and_both_halves_confirm_gaps(measures):
     tuned = [made("tune", "ES", n, better=n != "T01") for n in LAYOUTS if n[0] == "T"]
     runs = pd.concat([judged(), pd.DataFrame(tuned)], ignore_index=True)
     assert [*(yes := population.succeeds(runs[runs.part == "judge"])).index[~yes]] == FAILING
@@ -113,9 +113,6 @@ def test_the_measure_that_tells_success_is_ahead_of_noise(measures):
     assert 0 < answer.numbers["cost"] < 1
     runs["final_cost"] = 95.0  # none fails
     assert population.predictors(population.Drawn(runs, {}, measures)).outcome == UNDECIDABLE
-
-
-def test_closing_gaps_is_confirmed_by_both_halves_only(measures):
     success = population.succeeds(judged())
     answer = population.closing_gaps(measures, success)
     assert [*answer.counts.values()] == [(4, 4), (16, 16)]

@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pandas as pd
 import pytest
+from builders import evidence_of as made_up
 from builders import scaled, timings
 
 from nmpcrl.analysis import summaries
@@ -37,7 +38,7 @@ def with_part(known: Published, experiment: Experiment, part: str) -> Published:
 
 
 @pytest.fixture
-def study(made_up):
+def study():
     """A small main table; a function of the final costs of four runs of ES over the first cost."""
 
     def make(*costs):
@@ -157,7 +158,7 @@ def diverges(experiment):
     return {"reached": 40, "training": np.inf} if experiment.learner == "DES" else {}
 
 
-def test_verdicts_on_runs_are_compared_in_the_same_layouts_and_readings(made_up):
+def test_verdicts_on_runs_are_compared_in_the_same_layouts_and_readings():
     known, found = published_of(made_up().summaries), made_up(diverges).summaries
     pairs = of_runs(found, known)
     assert [here.claim for here, _ in pairs] == ["C1", "W9"]

@@ -38,13 +38,10 @@ def answered(*some):
     return WORLDS.answers(table)
 
 
-def test_of_nothing_no_question_can_be_decided():
+def test_of_nothing_nothing_is_decided_and_costs_are_back_and_alarms_false_as_by_hand():
     found = answered()
     assert [*found] == [one.name for one in WORLDS.questions]
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
-
-
-def test_a_cost_is_back_once_it_stays_and_alarms_are_false_where_the_map_is_true():
     before = [0.9] * 30
     assert back([*before, 0.91, *[0.9] * 29], 150) == 5
     assert back([*before, 1.2, 0.9, 1.2, *[0.9] * 27], 150) == 20

@@ -94,7 +94,7 @@ for module in list(sys.modules.values()):
 """
 
 
-def test_every_file_that_a_run_its_summary_and_a_search_import_is_in_the_lock():
+def test_the_lock_has_every_file_that_a_run_a_summary_and_a_search_import_as_it_is():
     """If a new file bears on no number: add it to `WITHOUT_NUMBERS`, else to `FILES`."""
     made = subprocess.run(
         [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True
@@ -105,10 +105,6 @@ def test_every_file_that_a_run_its_summary_and_a_search_import_is_in_the_lock():
     assert {one for one in listed - imported if one.startswith(("study", "analysis"))} == set()
     assert all(any(lock.ROOT.glob(one)) for one in lock.FILES)
     assert all((lock.ROOT / one).exists() for one in lock.OTHER_HOSTS)
-
-
-def test_the_code_is_what_the_lock_has():
-    """If this fails: `nmpcrl verify --relock`, or raise the epoch of the package and relock."""
     assert changed(sources(), lock.locked()["sources"]) == []
     assert lock.locked()["epochs"] == provenance.EPOCHS
 

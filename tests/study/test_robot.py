@@ -45,7 +45,7 @@ def test_the_nmpc_as_a_policy_makes_the_rollout_by_which_theta_is_judged(layout)
     assert len(rewards) == paper.STEPS
 
 
-def test_a_layout_is_drawn_anew_from_those_to_tune_on_and_a_seed_draws_the_same():
+def test_layouts_are_drawn_by_seed_actions_clipped_and_observations_stay_in_their_space():
     one, same, other = (RobotEnv() for _ in range(3))
     drawn = [
         [env.reset(seed=seed if first else None)[1]["layout"] for first in (True, *[False] * 9)]
@@ -54,9 +54,6 @@ def test_a_layout_is_drawn_anew_from_those_to_tune_on_and_a_seed_draws_the_same(
     assert drawn[0] == drawn[1] != drawn[2]
     assert len({*drawn[0], *drawn[2]}) > 5
     assert {*drawn[0], *drawn[2]} <= set(TUNE.values())
-
-
-def test_an_action_is_clipped_and_an_episode_stays_in_the_space_of_observations():
     env, found = RobotEnv("A"), []
     for action in (FORWARD, np.array([9.0, 0.0]), -FORWARD, np.array([0.6, np.pi / 2])):
         states, rewards, _ = follow(env, lambda _, action=action: action)
