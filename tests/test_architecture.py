@@ -11,14 +11,12 @@ ROOT = Path(__file__).resolve().parent.parent
 MODULES = sorted((ROOT / "nmpcrl").rglob("*.py"))
 
 
-def test_imports_run_one_way_and_a_foreign_library_has_one_home(monkeypatch, capsys):
+def test_imports_keep_their_contracts_control_and_learning_open_no_file_nothing_is_unpickled(
+    monkeypatch, capsys
+):
     monkeypatch.chdir(ROOT)
     monkeypatch.syspath_prepend(ROOT / "book")  # the driver
     assert lint_imports(no_cache=True, no_logo=True) == 0, capsys.readouterr().out
-
-
-def test_control_and_learning_open_no_file_and_no_array_is_unpickled():
-    """But for the cache of what numba compiled; what else knows the disk has to be imported."""
     paths = [*ROOT.glob("nmpcrl/control/**/*.py"), *ROOT.glob("nmpcrl/learning/**/*.py")]
     for path in paths:
         assert "codegen" in path.parts or not re.search(r"(?<![\w.])open\(", path.read_text()), path

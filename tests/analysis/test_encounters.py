@@ -11,7 +11,7 @@ from nmpcrl.study.moving import Straight, World, controller, still
 THETA = np.array(paper.THETA_INIT)
 
 
-def test_states_inside_are_counted_by_hand_and_a_rollout_is_judged_by_its_true_states():
+def test_states_inside_and_crowding_are_counted_by_hand_and_true_states_are_judged():
     passing = [Straight((-2.0, 0.0), (5.0, 0.0))]  # 1 m a step: -2, -1, 0, 1, 2, 3
     states = np.zeros((6, 3))
     assert count(states, passing) == Contacts(inside=3, collisions=1)
@@ -24,9 +24,6 @@ def test_states_inside_are_counted_by_hand_and_a_rollout_is_judged_by_its_true_s
     assert one.arrived
     assert len(one.states) == paper.STEPS + 1
     assert np.abs(np.diff(one.states[:, 0])).max() <= 0.12 + 1e-9  # no jump by a measurement
-
-
-def test_crowding_is_the_share_of_the_rectangle_and_counts_obstacles_where_a_robot_meets_them():
     one = crowding(still([(3.0, 1.75)]))
     share = np.pi * 1.25**2 / (11.0 * (0.5 + 2 * 2.5))
     assert one == pytest.approx(share, rel=0.1)

@@ -20,7 +20,7 @@ def model(**changed) -> Saving:
     return Saving(**{name: np.array(one) for name, one in (parts | changed).items()})
 
 
-def test_the_ratio_breaks_even_where_it_says_and_comes_down_to_what_u_allows():
+def test_the_ratio_breaks_even_where_it_says_within_its_interval_and_between_two_solvers():
     two = model()
     assert two.ratio(1e9) == pytest.approx(1 / 1.6)
     assert two.ratio(1e9, warm=1.0) == pytest.approx(0.5)
@@ -29,9 +29,6 @@ def test_the_ratio_breaks_even_where_it_says_and_comes_down_to_what_u_allows():
     assert same.break_even == pytest.approx(0.22)
     assert same.break_even_within == pytest.approx((0.22, 0.22))
     assert (np.diff(same.ratio(np.geomspace(0.01, 1e3))) < 0).all()
-
-
-def test_the_break_even_lies_within_its_interval_and_none_is_beyond_two_solvers():
     low, high = model().break_even_within
     assert low < model().break_even < high
     assert (low, high) == pytest.approx((0.1 / 0.6, 0.22 / 0.4))

@@ -41,7 +41,7 @@ def test_the_table_of_claims_and_the_first_paragraph_hold_the_published_verdicts
     assert [COUNTED.index(word.lower()) for word in found.groups()] == expected
 
 
-def test_the_halves_of_c1_are_those_of_the_published_verdict():
+def test_halves_of_c1_numbers_in_sentences_and_the_commit_are_the_published_ones():
     said = re.search(
         r"every step, (\d+) of (\d+) DES runs and (\d+) of \d+ RDES\s+runs diverge;.*?"
         r" every episode, (\d+) and (\d+), .*? p =\s+(0\.\d+)",
@@ -56,9 +56,6 @@ def test_the_halves_of_c1_are_those_of_the_published_verdict():
         if one.wrong == "diverged"
     }
     assert counts == {"step": (of, des, rdes), "episode": (of, des_episode, rdes_episode)}
-
-
-def test_numbers_in_sentences_and_the_commit_of_the_thresholds_are_the_published_ones():
     known, found = published.load(), finding(published.load())
     slow = "{:.2f} to {:.2f} at the paper's".format(*ratios_at_paper_speed(known.timings))
     kept = kept_without_noise(known.main.runs, BY_RUNS["C7"].learners).kept

@@ -80,7 +80,7 @@ def test_a_copy_solves_as_the_original_does_and_a_copied_solution_is_a_warm_star
         assert with_copy.value == pytest.approx(warm.value, rel=1e-9)
 
 
-def test_another_process_finds_the_same_key_and_the_same_bits():
+def test_another_process_finds_the_same_bits_and_a_copy_or_layout_no_other_machine_code():
     given = controllers()[0]
     asked, command = pickle.dumps(given), [sys.executable, "-c", ELSEWHERE]
     ran = subprocess.run(command, input=asked, capture_output=True, check=True)
@@ -88,9 +88,6 @@ def test_another_process_finds_the_same_key_and_the_same_bits():
     key, solution = pickle.loads(ran.stdout)
     assert key == nmpc.key
     same(solution, nmpc.solve(state, theta))
-
-
-def test_a_copy_another_layout_horizon_or_discount_takes_no_other_machine_code():
     for problem in (nmpc.problem for nmpc, *_ in controllers()):
         assert stages.write(pickle.loads(pickle.dumps(problem))) == stages.write(problem)
     robots = paper.nmpc(), paper.nmpc("B"), paper.nmpc(horizon=25, gamma=0.9)

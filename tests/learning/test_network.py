@@ -104,14 +104,11 @@ def test_nonsense_is_refused(message, refused):
         refused()
 
 
-def test_seeds_decide_every_bit_and_a_memory_that_is_not_full_none():
+def test_seeds_decide_every_bit_and_many_inputs_or_scales_are_as_one_by_one_and_divided():
     options = {"seed": 5}, {"seed": 5}, {"seed": 5, "memory": 200}, {"seed": 6}
     learners = [taught(rows(200), **one) for one in options]
     one, same, limited, other = ([learner.fit() for _ in range(20)] for learner in learners)
     assert one == same == limited != other
-
-
-def test_it_predicts_one_input_or_many_and_scales_are_as_if_the_caller_had_divided():
     learner, (inputs, _) = network(), rows(15)
     many, one = learner.predict(inputs.reshape(3, 5, 2)), learner.predict(inputs[0])
     assert (many.shape, one.shape) == ((3, 5), ())

@@ -88,7 +88,7 @@ def test_auc_counts_pairs_and_is_unknown_of_one_kind(layouts):
     assert np.isnan(found) if not pairs else found == pytest.approx(np.mean(pairs))
 
 
-def test_brier_by_hand_and_a_fit_without_a_slope_left_in_its_loss():
+def test_brier_by_hand_and_a_fit_is_finite_without_a_slope_left_in_its_loss():
     assert brier(np.array([1.0, 0.0]), np.array([True, False])) == 0
     assert brier(np.array([0.5, 0.5]), np.array([True, False])) == 0.25
     rng = np.random.default_rng(0)
@@ -97,9 +97,6 @@ def test_brier_by_hand_and_a_fit_without_a_slope_left_in_its_loss():
     slope, p = predicted(x, y, x)
     assert (p - y).sum() == pytest.approx(0, abs=1e-4)
     assert ((p - y) * (x - x.mean()) / x.std()).sum() + slope == pytest.approx(0, abs=1e-4)
-
-
-def test_a_fit_is_finite_where_a_measure_separates_successes_or_all_succeed():
     measure = np.arange(10.0)
     slope, p = predicted(measure, measure > 4, measure)
     assert 0 < slope < 10

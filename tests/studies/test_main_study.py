@@ -38,7 +38,7 @@ def test_missing_runs_are_trained_with_their_frozen_arms(known):
     assert lacking == {*main_table(both, ["A"], [1], 2)} == {*map(frozen_arm, lacking), *lacking}
 
 
-def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_are_stored(known):
+def test_published_runs_have_the_numbers_of_their_training_beside_runs_trained_here(known):
     found, there = gather("published", **ASKED), table(known)
     assert found.is_published
     assert (found.mark, found.origin) == ("4 runs published", "the published main table")
@@ -51,9 +51,6 @@ def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_ar
     assert not any(len(summary.actions) for summary in found.summaries.values())
     for experiment, one in published.with_inputs(found).summaries.items():
         np.testing.assert_allclose(one.actions, known[experiment].actions, atol=1e-6)
-
-
-def test_runs_trained_here_stand_beside_published_ones(known):
     found = gather("published", **MORE)
     sources = found.runs.groupby("seed").source.unique()
     assert (sources[0].tolist(), sources[1].tolist()) == (["published"], ["fresh"])

@@ -95,7 +95,7 @@ def test_advice_follows_its_rule(blocks, expected):
     assert [*dict(zip(found.entry, found.word, strict=True)).items()] == expected
 
 
-def test_every_entry_is_compared_from_its_default_and_without_runs_nothing_is_decided():
+def test_every_entry_is_compared_from_its_default_with_the_published_tuning():
     found = REMEDIES.answers(table(*block("frozen")))
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
     assert [*remedies.SETTINGS] == [*ENTRIES]
@@ -103,9 +103,6 @@ def test_every_entry_is_compared_from_its_default_and_without_runs_nothing_is_de
         assert bool(settings) == bool(ENTRIES[entry].defaults)
         assert next(iter(arms(entry))) == entry
         assert len(arms(entry)) == max(len(settings), 1)
-
-
-def test_published_arms_are_those_of_the_published_tuning_and_can_be_sent_to_a_worker():
     known = REMEDIES.table()
     for part in [*PARTS][1:]:
         if len({*map(REMEDIES.is_current, ("best", "tune", part))}) > 1:

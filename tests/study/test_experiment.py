@@ -145,7 +145,7 @@ def failing(monkeypatch):
     return fail
 
 
-def test_failures_are_recorded(failing):
+def test_failures_restarts_and_the_worst_violation_of_a_step_are_recorded(failing, monkeypatch):
     failing(lambda call: call == 6 + 3)  # the fourth step, after a rollout of six
     records = run(Experiment(learner="frozen", episodes=2, steps=6))
     s = records.steps
@@ -156,10 +156,6 @@ def test_failures_are_recorded(failing):
         assert (missing.all(axis=1) == (s["status"] == StepStatus.FAILED)).all()
     assert np.isfinite(s["theta"]).all()
     assert records.facts["stopped"] == "finished"
-
-
-def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
-    """The first and the second solve of ES, three steps after a rollout of three."""
     restarts = [0, 0, 0] + [0, 1, 2, 2, 0, 0] + [0, 0, 0]
     violation = [0, 0, 0] + [0.3, 0.1, 0.0, 0.2, 0.0, 0.0] + [0, 0, 0]
 

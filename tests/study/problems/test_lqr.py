@@ -13,7 +13,7 @@ NMPC = Nmpc(lqr.problem(), solver=Riccati(1e-11))
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-def test_value_gradient_and_policys_sensitivity_are_those_of_riccatis_recursion():
+def test_value_gradient_and_sensitivity_are_riccatis_and_an_informed_plan_has_the_best_policy():
     theta = lqr.problem().theta + 0.02 * np.random.default_rng(1).normal(size=16)
     theta = lqr.problem().names.filled(theta, {"R": [[0.4]]})
     solution, step = NMPC.solve(STATE, theta), 1e-6
@@ -30,9 +30,6 @@ def test_value_gradient_and_policys_sensitivity_are_those_of_riccatis_recursion(
     moves = np.array([(up[1] - down[1]) / (2 * step) for up, down in sides]).T
     np.testing.assert_allclose(solution.features, slopes, atol=1e-6)
     np.testing.assert_allclose(NMPC.policy_jacobian(solution), moves, atol=1e-6)
-
-
-def test_an_informed_plan_has_the_best_policy_and_its_value_at_any_horizon():
     best, theta = lqr.optimal(), lqr.problem(informed=True).theta
     solution = NMPC.solve(STATE, theta)
     assert solution.value == pytest.approx(STATE @ best.P @ STATE, rel=1e-9)
