@@ -138,6 +138,8 @@ class Nmpc(Described):
             if (action < self.lower).any() or (action > self.upper).any():
                 bounds = f"{short(self.lower)} and {short(self.upper)}"
                 raise ValueError(f"action {short(action)} must lie between {bounds}")
+        if not (warm_start is None or isinstance(warm_start, Solution)):
+            raise ValueError(f"warm_start = {warm_start!r} must be a Solution, which solve returns")
         variant = self._free if action is None else self._fixed
         try:
             return variant.solve(Asked(state, theta, warm_start, given, known, began))

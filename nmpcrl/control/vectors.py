@@ -16,6 +16,12 @@ def read_only(numbers: Any) -> Vector:
     return copy
 
 
+def step_size(name: str, number: Any) -> None:
+    """Refuse what is no finite number, 0 or more, such as the text that YAML makes of 1e-7."""
+    if isinstance(number, str) or not 0 <= number < np.inf:
+        raise ValueError(f"{name} = {number!r} must be a finite number, 0 or more")
+
+
 def positive_integer(name: str, number: Any) -> int:
     """A whole number, 1 or more; ValueError for any other."""
     if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:

@@ -104,11 +104,14 @@ def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
     return step
 
 
-def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool) -> str:
-    """Why no plan can begin in a state; "" if one can, or if a finite episode ends there."""
+def unusable(state: Vector, cost: float, nmpc: Nmpc | None, *, end: bool) -> str:
+    """Why nothing is learned from a step: its cost, or a state in which no plan can begin.
+
+    "" if something is; an episode may end in any finite state.
+    """
     largest = sys.float_info.max if nmpc is None or end else nmpc.farthest
     if all(abs(number) <= largest for number in state.tolist()):
-        return ""
+        return "" if abs(cost) < np.inf else f"the plant's cost in state {short(state)} is {cost}"
     return (
         f"no plan can begin in state {short(state)}, to which the plant ran away: its numbers must"
         f" be finite and of size at most {largest:g}"

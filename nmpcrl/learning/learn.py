@@ -209,7 +209,10 @@ def _learner(nmpc: Nmpc, learner: Learner | str, options: dict[str, Any]) -> Lea
     try:
         inspect.signature(make).bind(nmpc, **options)
     except TypeError as error:
-        example = 'learn(nmpc, "QL", plant=plant, start=start, alpha=1e-4)'
+        others = [*inspect.signature(make).parameters.values()][1:]
+        needed = [one.name for one in others if one.default is one.empty]
+        words = "".join(f", {name}=..." for name in needed)
+        example = f'learn(nmpc, "{learner}", plant=plant, start=start{words})'
         raise ValueError(f"{learner} is {make.__name__}: {error}; write {example}") from error
     return make(nmpc, **options)
 

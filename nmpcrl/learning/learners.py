@@ -23,6 +23,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
+from nmpcrl.control.vectors import step_size
 from nmpcrl.learning.bootstrap import (
     Bootstrap,
     Imitation,
@@ -92,6 +93,9 @@ class SemiGradient:
 
     alpha: float
 
+    def __post_init__(self) -> None:
+        step_size("alpha", self.alpha)
+
     def __call__(
         self, theta: Vector, memory: Any, transition: Transition, delta: float, _: NextValue
     ) -> tuple[Vector, Any]:
@@ -118,6 +122,10 @@ class GradientTD:
     gamma: float
     curved: Nmpc | None = None  #: knows the Hessian, for the term that Eq. (16) drops
     follow: Callable[[Vector, float, Vector, float], Vector] = auxiliary_step  #: moves w
+
+    def __post_init__(self) -> None:
+        step_size("alpha", self.alpha)
+        step_size("beta", self.beta)
 
     def __call__(
         self, theta: Vector, memory: Auxiliary, transition: Transition, delta: float,

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.vectors import step_size
 
 Bounds = tuple[Vector | float, Vector | float]  # the least and the largest theta
 Optimiser = Callable[[Vector, Vector, Matrix], Vector]  # theta, gradient, curvature -> theta
@@ -21,6 +22,9 @@ class Descent:
     """theta - alpha g: gradient descent, whatever the curvature is."""
 
     alpha: float
+
+    def __post_init__(self) -> None:
+        step_size("alpha", self.alpha)
 
     def __call__(self, theta: Vector, gradient: Vector, curvature: Matrix) -> Vector:
         return theta - self.alpha * gradient

@@ -13,8 +13,8 @@ from nmpcrl.learning.environment import (
     StepFunction,
     environment,
     nmpc_of,
-    ran_away,
     stream,
+    unusable,
 )
 
 
@@ -70,7 +70,7 @@ def evaluate(
         actions.append(np.array(plan.action, float))
         state, cost, end, cut = around.step(state, actions[-1], rng)
         costs.append(cost)
-        failure = ran_away(state, nmpc, end=end)
+        failure = unusable(state, cost, nmpc, end=end)
         if failure or end or cut:
             break
     inputs = nmpc.m if nmpc else actions[0].size if actions else 0

@@ -20,8 +20,8 @@ from nmpcrl.learning.environment import (
     StepFunction,
     environment,
     nmpc_of,
-    ran_away,
     stream,
+    unusable,
 )
 from nmpcrl.learning.learners import Learner, Update, Weights
 
@@ -256,7 +256,7 @@ class Trainer:
             action = nmpc.clip(action) if self.clipped else action  # departure E
             next_state, cost, end, cut = self.environment.step(state, action, self.rng)
             found = (episode, t, state, weights, action, cost, plan)
-            gone = ran_away(next_state, nmpc, end=end)
+            gone = unusable(next_state, cost, nmpc, end=end)
             if gone:
                 yield self._failed(gone, *found)
                 return

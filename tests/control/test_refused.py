@@ -126,6 +126,8 @@ def test_a_solve_that_is_none():
         nmpc.value_hessian_times(nmpc.solve(np.zeros(2), theta), np.zeros(2))
     with pytest.raises(ValueError, match=r"data has no 'wind' .it has none"):
         nmpc.solve(np.zeros(2), theta, data={"wind": 1.0})
+    with pytest.raises(ValueError, match="warm_start = 0 must be a Solution, which solve returns"):
+        nmpc.solve(np.zeros(2), theta, 0)
     assert nmpc.solve(np.array([3000.0, -2e5]), theta).value > 0  # no unit is forbidden
 
 

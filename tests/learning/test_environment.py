@@ -114,6 +114,13 @@ def test_a_plant_that_runs_away_is_a_failed_solve(tank, later, end, ran):
             run(learner, tank, noise(10, 3, 1), **how)
 
 
+def test_a_cost_that_is_no_number_ends_the_episode_and_leaves_theta(tank):
+    how = {"plant": lambda state, action, rng: (state, np.nan, False), "start": [0.1]}
+    assert "cost in state [0.1] is nan" in evaluate(tank, tank.problem.theta, 1, **how).failure
+    with pytest.raises(Diverged, match=r"10 episodes in a row .* cost in state \[0.1\] is nan"):
+        run(expected_sarsa(tank, 1e-3), tank, noise(10, 3, 1), **how)
+
+
 @pytest.mark.parametrize("broken", ["plant", "start", "data"])
 def test_an_error_inside_a_function_of_the_user_is_that_error(tank, broken):
     def fails(*given):

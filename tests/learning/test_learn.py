@@ -193,7 +193,9 @@ def test_a_plant_is_told_the_time_since_the_start(nmpc):
 @pytest.mark.parametrize(
     ("learner", "given", "said"),
     [
-        ("QL", {}, r"QL is q_learning: missing a required argument: 'alpha'; write learn\("),
+        ("GES", {"beta": 1}, r"'alpha'; write learn\(nmpc, \"GES\", .*, alpha=..., beta=...\)"),
+        ("QL", {"alpha": "1e-3"}, "alpha = '1e-3' must be a finite number, 0 or more"),
+        ("GES", {"alpha": 1, "beta": np.nan}, "beta = nan must be a finite number, 0 or more"),
         ("LSTD", {}, "learner = 'LSTD' is unknown: it must be a Learner, or one of LSTD-Q, QL"),
         ("LSTD-Q", {"episode": 3}, "unexpected keyword argument 'episode'"),
         ("LSTD-Q", {"episodes": 0}, "episodes = 0 must be a whole number, 1 or more"),
