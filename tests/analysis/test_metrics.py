@@ -90,15 +90,12 @@ def test_steps_above_two_overshoot_and_neither_a_bound_nor_an_unknown_action_is_
     assert found.tolist() == [False, False, True, True, False]
 
 
-def test_the_boundary_is_the_one_of_the_theta_that_the_step_was_solved_with():
+def test_boundaries_are_of_the_theta_of_a_step_and_predictions_compared_with_the_next_one():
     theta, bounds = np.zeros((3, D)), np.full(3, 9.0)
     theta[0, -1] = 0.1  # moves the boundary away from the second step on
     run = records([[1, 1, 1]], state=[[1.25, 0, 0]] * 3, theta=theta)  # where Xi = 0
     scene = Task(np.zeros(3), np.zeros(3), -bounds, bounds, obstacles=(Obstacle(0.0, 0.0),))
     assert metrics.boundary_share(run, scene) == pytest.approx(2 / 3)
-
-
-def test_features_and_predictions_are_compared_with_the_next_step_of_the_episode():
     phi = np.zeros((6, D))
     phi[:, :2] = [[1, 0], [2, 0], [0, 1], [3, 0], [np.nan, 0], [1, 1]]
     run = records(np.ones((2, 3)), features=phi)  # three pairs are of two episodes, or unknown

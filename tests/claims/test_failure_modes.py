@@ -73,7 +73,7 @@ def test_a_mechanism_is_found_in_the_episodes_in_which_the_cost_rose(columns, na
     assert mechanism(made(**columns), THROUGH) == name
 
 
-def test_episodes_without_a_prediction_do_not_count_and_a_used_gap_closes_once():
+def test_a_used_gap_closes_once_and_the_first_mechanism_in_order_counts():
     run = made(bias=(WINDOW, 30.0))
     run.episodes["bias"][AMONG] = run.episodes["delta"][AMONG] = np.nan
     assert mechanism(run, THROUGH) == "network"
@@ -82,9 +82,6 @@ def test_episodes_without_a_prediction_do_not_count_and_a_used_gap_closes_once()
     assert mechanism(closed, THROUGH) == "gap"
     closed.experiment["theta"] = (*paper.THETA_INIT[:-1], CLOSING + 0.05)  # from the start
     assert mechanism(closed, THROUGH) == OTHER
-
-
-def test_the_first_mechanism_in_order_counts():
     names = [*SIGNS]
     left = [{name: (WINDOW, SIGNS[name]) for name in names[i:]} for i in range(len(names) + 1)]
     assert tuple(mechanism(made(**columns), THROUGH) for columns in left) == (*Mechanism,)

@@ -16,15 +16,12 @@ def arc(state, speed, turn_rate, time):
     return np.array([x + radius * along, y - radius * across, later])
 
 
-def test_runge_kutta_is_the_exponentials_series_up_to_the_fourth_power():
+def test_a_step_is_the_exponentials_series_and_lies_on_an_arc_a_line_or_a_parabola():
     """On x' = a x every one of the four slopes differs; the step must be 1 + z + ... + z^4 / 24."""
     growth = plant(dynamics=lambda state, action: action * state, period=0.5)
     z = 0.5 * 0.8
     series = 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
     np.testing.assert_allclose(growth.step([1.0, -2.0], [0.8]), [series, -2 * series])
-
-
-def test_a_step_is_a_fifth_of_a_second_on_an_arc_a_line_or_a_parabola_and_inputs_are_clipped():
     state, action = np.array([1.0, 2.0, -0.7]), np.array([0.5, -1.0])
     stepped = differential_drive().step(state, action)
     np.testing.assert_allclose(stepped, arc(state, *action, 0.2), atol=1e-6)

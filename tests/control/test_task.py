@@ -9,7 +9,7 @@ from nmpcrl.control import Obstacle
 STILL = np.zeros(2)
 
 
-def test_overlap_is_one_at_the_centre_zero_at_the_edge_and_equation_nineteen_between():
+def test_overlap_and_cost_are_equations_nineteen_and_twenty_by_hand():
     states = np.array([[0.5, 2.2, 0.3], [0.5, 2.2 + 1.25, -1.0], [1.0, 1.0, 0.0]])
     by_hand = [1, 0, 1 - 4 * (0.5**2 + 1.2**2) / 2.5**2]
     np.testing.assert_allclose(task().overlap(states)[:, 0], by_hand, rtol=1e-13, atol=1e-15)
@@ -19,10 +19,6 @@ def test_overlap_is_one_at_the_centre_zero_at_the_edge_and_equation_nineteen_bet
     np.testing.assert_array_equal(task().overlap(many), one_by_one)
     small = task(obstacles=(Obstacle(0.0, 0.0, diameter=0.5),), robot_diameter=0.3)
     assert small.overlap(np.array([0.4, 0.0, 0.0]))[0] == pytest.approx(0, abs=1e-15)
-
-
-def test_the_cost_is_distance_and_penalty_or_nearby_the_norm_of_the_action():
-    """Nearby means closer than d_t over all states, the heading included."""
     state, action = np.array([0.5, 1.2, 0.5]), np.array([0.3, -0.4])  # of norm 0.5
     tracking = 8.0**2 + 0.8**2 + 0.1 * (np.pi / 2 - 0.5) ** 2
     penalty = 50 * (1 - 4 * 1.0**2 / 2.5**2 + 0.35)  # the second obstacle is too far away

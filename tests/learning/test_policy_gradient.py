@@ -65,7 +65,7 @@ P = value(K)
 SLOPE = 2 * (GAMMA * B.T @ P @ (A - B @ K) - R @ K)  # dQ / da in a = -K s, times s
 
 
-def test_the_critic_has_value_and_slope_of_the_action_value_and_a_step_goes_down_it():
+def test_the_critic_has_value_and_slope_and_the_gradient_is_that_of_the_return():
     means = means_of(pairs())
     v = lstd_value(means, 0.0)
     curvature = float((R + GAMMA * B.T @ P @ B).item())
@@ -77,10 +77,6 @@ def test_the_critic_has_value_and_slope_of_the_action_value_and_a_step_goes_down
         weights = learner.step(weights, step).weights
     gradient = np.mean([-(SLOPE @ t.state) * t.state for t in pairs()], axis=0)
     np.testing.assert_allclose(weights.theta, K.ravel() - 0.1 * gradient, atol=1e-7)
-
-
-def test_the_gradient_is_that_of_the_return():
-    """Against central differences of E[s'P s] in K, over starts weighted as they are visited."""
     starts = np.random.default_rng(2).normal(size=(40, 2))
     covariance = starts.T @ starts / len(starts)
     numeric = differences(lambda gain: np.trace(value(gain[None]) @ covariance), K.ravel(), 1e-6)

@@ -13,7 +13,7 @@ NMPC = Nmpc(lqr.problem(), solver=Riccati(1e-11))
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-def test_value_gradient_and_sensitivity_are_riccatis_and_an_informed_plan_has_the_best_policy():
+def test_values_and_slopes_are_riccatis_and_the_worth_of_a_gain_is_what_it_costs():
     theta = lqr.problem().theta + 0.02 * np.random.default_rng(1).normal(size=16)
     theta = lqr.problem().names.filled(theta, {"R": [[0.4]]})
     solution, step = NMPC.solve(STATE, theta), 1e-6
@@ -34,9 +34,6 @@ def test_value_gradient_and_sensitivity_are_riccatis_and_an_informed_plan_has_th
     solution = NMPC.solve(STATE, theta)
     assert solution.value == pytest.approx(STATE @ best.P @ STATE, rel=1e-9)
     np.testing.assert_allclose(solution.action, -best.K @ STATE, atol=1e-8)
-
-
-def test_the_worth_of_a_gain_is_what_it_costs():
     best = lqr.optimal()
     for k in (best.K, lqr.optimal(gz.WRONG_A, gz.WRONG_B).K):
         state, total, rng = lqr.START, 0.0, np.random.default_rng(0)
