@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+import torch
+from differences import active
 from small_problems import limited, pendulum, tank
 
-from nmpcrl.control import Nmpc, SolverError
+from nmpcrl.control import Ipopt, Nmpc, Riccati, SolverError
+from nmpcrl.torch import Layer
 
 COUNT = 8
 PARTS = ("value", "features", "point", "iterations", "violation", "restarts", "status", "action")
@@ -83,3 +86,41 @@ def test_a_shape_is_refused_with_the_one_to_give():
     ):
         with pytest.raises(ValueError, match=said):
             nmpc.solve_many(*given)
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize("make", [pendulum, limited])
+def test_200_plans_are_ipopts_and_their_slopes_in_a_layer_are_differences(make):
+    """dV and a sum over the plan along a direction of states, thetas and data at once."""
+    nmpc, ipopt = Nmpc(make(), solver=Riccati(1e-11)), Nmpc(make(), solver=Ipopt(1e-10))
+    states, thetas, _, data = drawn(nmpc, 200)
+    parts, rng, step = [0.4 * states, thetas, data["wind"]], np.random.default_rng(1), 1e-5
+    along = [rng.normal(size=part.shape) for part in parts]
+    weights, tried, missed = rng.normal(size=(200, 6, 1)), 0, 0
+
+    def solved(by, warm=None):
+        states, thetas, wind = (part + by * way for part, way in zip(parts, along, strict=True))
+        return nmpc.solve_many(states, thetas, warm, data=data | {"wind": wind})
+
+    here = solved(0.0)
+    above, below = solved(step, here), solved(-step, here)
+    given = [torch.tensor(part, requires_grad=True) for part in parts]
+    value, _, plan = Layer(nmpc)(*given[:2], {"wind": given[2], "target": data["target"]})
+    numbers = value, (torch.tensor(weights) * plan).sum((1, 2))
+    slopes = []
+    for number in numbers:
+        grads = torch.autograd.grad(number.nansum(), given, retain_graph=True)
+        slopes.append(sum((g.numpy() * a).sum(1) for g, a in zip(grads, along, strict=True)))
+    for k in np.flatnonzero(here.solved & (here.violation == 0)):
+        at = {"wind": data["wind"][k], "target": data["target"]}
+        other = ipopt.solve(parts[0][k], thetas[k], here[k], data=at)
+        assert here.value[k] == pytest.approx(other.value, rel=1e-7)
+        kind = active(here[k])
+        if kind is not None and {active(above[k]), active(below[k])} == {kind}:
+            tried += 1
+            assert here.inputs[k] == pytest.approx(other.inputs, abs=1e-4)
+            by_plan = (weights[k] * (above.inputs[k] - below.inputs[k])).sum()
+            expected = np.array([above.value[k] - below.value[k], by_plan]) / (2 * step)
+            missed += [slopes[0][k], slopes[1][k]] != pytest.approx(expected, rel=1e-4, abs=1e-4)
+    assert tried > 100
+    assert missed <= 2  # next to a kink, where the error of a solve shows in a difference

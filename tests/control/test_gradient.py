@@ -53,17 +53,25 @@ def difference(nmpc: Nmpc, here: Solution, number: Any, moved: Any) -> float | N
     return float(number(above) - number(below)) / (2 * STEP)
 
 
-@pytest.mark.parametrize("solver", [Riccati(1e-11), Fatrop(1e-10)], ids=["riccati", "fatrop"])
+@pytest.mark.parametrize(
+    ("solver", "points"),
+    [
+        pytest.param(Riccati(1e-11), 8, id="riccati"),
+        pytest.param(Fatrop(1e-10), 8, id="fatrop"),
+        pytest.param(Riccati(1e-11), 200, id="200 points", marks=pytest.mark.weekly),
+    ],
+)
 @pytest.mark.parametrize(
     "make",
     [pendulum, limited, partial(tank, 1e-6), partial(drawn, 11)],
     ids=["P", "H", "T", "one state"],
 )
-def test_derivatives_along_any_direction_are_differences(make, solver, request):
+def test_derivatives_along_any_direction_are_differences(make, solver, points, request):
     if make is not pendulum:
         request.getfixturevalue("interpreted")
     nmpc, rng, compared = Nmpc(make(), solver=solver), np.random.default_rng(0), Counter()
-    for k in range(8):
+    missed = 0
+    for k in range(points):
         given = asked(nmpc, rng, fixed=k % 2 == 1)
         try:
             here = nmpc.solve(**given)
@@ -84,9 +92,11 @@ def test_derivatives_along_any_direction_are_differences(make, solver, request):
                 slope = None if here.violation else difference(nmpc, here, number, moved)
                 if slope is not None:
                     part = found.data[name] if name in found.data else getattr(found, name)
-                    assert (part * along).sum() == pytest.approx(slope, rel=1e-4, abs=2e-5)
+                    near = pytest.approx(slope, rel=1e-4, abs=2e-5)
+                    missed += (part * along).sum() != near
                     compared[kind, name] += 1
         np.testing.assert_allclose(kinds["value"][0].theta, here.features, rtol=1e-6, atol=1e-8)
+    assert missed <= points // 100  # next to a kink, where the error of a solve shows
     assert len(compared) == 2 * (3 + len(nmpc.problem.data_names))
     assert min(compared.values()) >= 2, compared
 
