@@ -21,7 +21,7 @@ def made_up(value, theta, *, episodes=5, steps=60):
 MOVING = np.random.default_rng(1).uniform(0, 2, (300, 9))  # another theta at every step
 
 
-def test_only_a_network_with_theta_follows_a_value_that_depends_on_it_and_both_any_other():
+def test_a_network_with_theta_follows_a_value_that_depends_on_it_in_episodes_held_out():
     records = made_up(lambda _, theta: 10 * theta[:, 0], MOVING)
     assert imitate(records, fits=500).ratio < 0.5
     imitation = imitate(made_up(lambda state, _: 10 * state[:, 0], MOVING), fits=1000)
@@ -30,8 +30,6 @@ def test_only_a_network_with_theta_follows_a_value_that_depends_on_it_and_both_a
     assert imitation.error("without_theta") == pytest.approx(np.sqrt(squares.mean()))
     assert imitation.error("with_theta") < 0.5 * imitation.value.std()
 
-
-def test_every_fifth_episode_is_held_out_or_the_last_and_a_failed_solve_is_left_out():
     def value(state, _):
         return state[:, 0]
 

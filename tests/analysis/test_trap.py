@@ -41,14 +41,12 @@ def test_before_a_closed_gap_the_robot_stands_and_its_td_error_is_above_0():
     assert (last.moved, last.phi_c) == pytest.approx((found["moved"], found["phi_c"]))
 
 
-def test_a_stretch_is_the_first_unbroken_part_in_which_the_robot_stands():
+def test_a_stretch_is_the_first_unbroken_stand_and_a_cliff_lies_between_points_of_a_grid():
     course = [(True, 0.0), (False, 1.2), (False, 0.01), (False, 0.01), (True, 0.0), (False, 0.01)]
     found = [SimpleNamespace(arrived=arrived, moved=moved) for arrived, moved in course]
     assert stretch(found, 0.05) == found[2:4]
     assert stretch(found[:2], 0.05) == []
 
-
-def test_the_cliff_is_found_between_points_of_a_grid_and_raising_theta_c_across_it_costs_much():
     def cost(theta_c):
         return 100.0 + (60.0 if theta_c > 0.137 else theta_c)
 

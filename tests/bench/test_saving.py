@@ -20,7 +20,7 @@ def model(**changed) -> Saving:
     return Saving(**{name: np.array(one) for name, one in (parts | changed).items()})
 
 
-def test_the_ratio_breaks_even_where_it_says_within_its_interval_and_between_two_solvers():
+def test_the_ratio_breaks_even_within_its_interval_and_goes_through_the_published_ones():
     two = model()
     assert two.ratio(1e9) == pytest.approx(1 / 1.6)
     assert two.ratio(1e9, warm=1.0) == pytest.approx(0.5)
@@ -43,10 +43,6 @@ def test_the_ratio_breaks_even_where_it_says_within_its_interval_and_between_two
     never = model(warm=[0.4, 0.4])
     assert never.break_even == np.inf
     assert np.isnan(never.break_even_within).all()
-
-
-def test_the_curve_goes_through_the_published_ratios():
-    """And so a bar of parts ends at the ratio that is written beside it."""
     timings = published.load().timings
     for row in timings[timings.learner == "RDES"].itertuples():
         measured = ratio(timings, row.solver, "RDES").value

@@ -68,13 +68,10 @@ def test_every_update_and_every_control_is_beside_an_equation(module):
     assert {f"{module}.{name}" for name in defined(text)} <= set(FUNCTIONS)
 
 
-def test_every_departure_has_a_section_that_renders_it():
+def test_every_departure_has_a_section_and_chapters_the_parameters_that_they_declare():
     text = (ROOT / "book/departures.ipynb").read_text()
     assert re.findall(r'<a id=\\"departure-([A-Z])\\"', text) == list(DEPARTURES)
     assert re.findall(r"tables\.departure\(\\\"([A-Z])\\\"\)", text) == list(DEPARTURES)
-
-
-def test_the_parameters_of_the_chapters_are_those_that_they_declare():
     rows = re.findall(r"^\| `(\d\d_\w+|solver)` \| (.*) \|$", REPRODUCE, flags=re.M)
     listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
     declared = {

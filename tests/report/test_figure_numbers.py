@@ -226,16 +226,13 @@ def test_only_narrow_gaps_are_drawn_from_centre_to_centre_and_name_the_layout():
     assert panel.get_title("left") == "A: open, +0.01 m"
 
 
-def test_the_map_has_a_frame_and_an_arrow_for_every_change():
+def test_the_map_has_a_frame_for_every_change_and_thresholds_are_drawn_where_fixed():
     found = made_up(in_one_layout)
     rows = robustness_map(found.runs, found.paths)
     panel = layouts.verdict_map(rows, "Some change", "").axes[0]
     frames = [p for p in panel.patches if p.get_edgecolor() == to_rgba("black")]
     arrows = [text.get_text() for text in panel.texts if "→" in text.get_text()]
     assert len(frames) == len(arrows) == rows.changes.sum() > 0
-
-
-def test_thresholds_are_drawn_where_they_were_fixed_and_a_verdict_is_kept_between_two():
     found = made_up()
     values = {claim: one.measure(found.runs, found.paths) for claim, one in BY_RUNS.items()}
     for panel, claim in zip(layouts.borders(values, "").axes, BY_RUNS.values(), strict=False):

@@ -41,7 +41,7 @@ def cells(table: str) -> list[list[str]]:
 # Claims
 
 
-def test_a_verdict_shows_its_share_and_interval_beside_that_of_other_runs():
+def test_a_verdict_shows_its_share_and_interval_and_each_layout_and_decay_in_words():
     known, own = verdict(NOT), verdict(PARTLY, share=0.75, interval=(0.5, 0.875))
     shown = tables.verdict_table([known], "<All of it.>", [own])
     header, row = cells(shown)
@@ -49,9 +49,6 @@ def test_a_verdict_shows_its_share_and_interval_beside_that_of_other_runs():
     assert row == ["C1", "a < b & c.", NOT, f"{PARTLY}|75% [50%, 88%]"]
     assert cells(tables.verdict_table([own], ""))[1][2] == row[3]
     assert "<caption>&lt;All of it.&gt;</caption>" in shown
-
-
-def test_a_claim_is_shown_in_each_layout_and_decay_in_colour_and_in_words():
     parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
     table = tables.layout_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
     assert cells(table) == [

@@ -10,7 +10,7 @@ from nmpcrl.studies import interventions, population
 from nmpcrl.studies.interventions import ARMS, INTERVENTIONS
 
 
-def test_all_stopped_runs_are_made_again_beginning_with_one_of_each_of_50_drawn_layouts():
+def test_all_stopped_runs_are_made_again_nudged_ones_beside_theta_init_and_paired(monkeypatch):
     six, drawn = (INTERVENTIONS.parts[part].order("nudged") for part in ("six", "drawn"))
     halves = published.load().verdict("C1").halves
     (stopped,) = (one.counts[1] for one in halves
@@ -18,9 +18,6 @@ def test_all_stopped_runs_are_made_again_beginning_with_one_of_each_of_50_drawn_
     count, _ = population.early_overshoot(population.load().main).beside["runs stopped"]
     assert (len({*six}), len({*drawn})) == (len(six), len(drawn)) == (stopped, count)
     assert len({place for place, _ in drawn[:50]}) == 50
-
-
-def test_a_nudged_run_starts_beside_theta_init_and_a_difference_pairs_runs(monkeypatch):
     watched = []
 
     def watch(experiment, intervention):

@@ -30,15 +30,12 @@ def known():
     return summaries
 
 
-def test_missing_runs_are_trained_with_their_frozen_arms(known):
+def test_missing_runs_are_trained_with_their_frozen_arms_beside_published_ones(known):
     both = ["ES", "frozen"]
     assert needed("published", **ASKED) == ()
     assert set(needed("fresh", **ASKED)) == set(known)
     lacking = set(needed("published", **MORE))
     assert lacking == {*main_table(both, ["A"], [1], 2)} == {*map(frozen_arm, lacking), *lacking}
-
-
-def test_published_runs_have_the_numbers_of_their_training_beside_runs_trained_here(known):
     found, there = gather("published", **ASKED), table(known)
     assert found.is_published
     assert (found.mark, found.origin) == ("4 runs published", "the published main table")
