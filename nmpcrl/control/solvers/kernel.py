@@ -92,6 +92,7 @@ options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
 # To be called from machine code alone: a wrapper for Python takes a quarter of the compiling.
 inner: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 allocating = njit(**inner, **options)
+merged = njit(inline="always", **options)  # a part of its one caller, compiled once and with it
 inlined = njit(_nrt=False, **inner, **options)
 
 
@@ -784,7 +785,7 @@ def strays(point, plan, ahead):
     return not farthest <= max(GROWS * apart, NOTICED * largest)
 
 
-@allocating
+@merged
 def task_of(theta, data, lower, upper, sides, kind, discount, weights, first):
     """The problem before `scale`."""
     count, rows = len(discount), len(weights) + len(sides)
@@ -990,7 +991,7 @@ def allocate_point(N, every):
     )
 
 
-@allocating
+@merged
 def allocate(N, rows):
     """Space for an iterate, another, multipliers twice, derivatives and a step."""
     n, every = N + 1, (N + 1) * rows
@@ -1015,7 +1016,7 @@ def allocate(N, rows):
     return allocate_point(N, every), allocate_point(N, every), duals, old, stages, step
 
 
-@allocating
+@merged
 def solve(
     data, lower, upper, sides, kind, discount, weights, tie, state, theta, action, fixed,
     start, limit, tolerance, inputs, warm_start, out,

@@ -60,13 +60,22 @@ class Arguments(NamedTuple):
 def machine_code(problem: Problem, entry: str = "find") -> Any:
     """The function `find.find` or `slopes.slopes`, compiled for a problem once.
 
+    `slopes` takes `kernel` and `model` from the package of the solver, whose functions may have
+    been compiled in this process.
+
     Raises:
         CannotCompile: the problem holds an operation that is not known.
     """
     if entry not in problem.machine_code:
-        texts = {name: TEXTS[name] for name in ("codes", "kernel", entry)}
-        texts |= {"__init__": f"from .{entry} import {entry}\n", "model": stages.write(problem)}
-        notice = NOTICE if entry == "find" else PLAN_NOTICE
+        if entry == "find":
+            texts = {name: TEXTS[name] for name in ("codes", "kernel", "find")}
+            texts["model"], notice = stages.write(problem), NOTICE
+        else:
+            solver = next(iter(problem.machine_code.values()), None) or machine_code(problem)
+            package, _, _ = solver.__module__.partition(".")
+            texts = {name: f"from {package}.{name} import *\n" for name in ("kernel", "model")}
+            texts["slopes"], notice = TEXTS["slopes"], PLAN_NOTICE
+        texts["__init__"] = f"from .{entry} import {entry}\n"
         problem.machine_code[entry] = getattr(load("riccati", texts, notice), entry)
     return problem.machine_code[entry]
 

@@ -22,7 +22,6 @@ from .kernel import (
     RIGID,
     SAME,
     allocate,
-    allocating,
     begin_bounds,
     begin_inputs,
     condense,
@@ -32,6 +31,7 @@ from .kernel import (
     inlined,
     linearise,
     measure,
+    merged,
     options,
     places,
     recall,
@@ -138,7 +138,7 @@ def gradient_along(task, point, stages, step, factor, w, out):
     model.initial_along(point.x[0], theta, task.data[0], w, out)
 
 
-@allocating
+@merged
 def system(
     data, lower, upper, sides, kind, discount, weights, state, theta, action, fixed, solved,
 ):  # fmt: skip
