@@ -36,6 +36,8 @@ def test_a_learner_is_what_its_entry_says_and_reads_only_what_its_entry_names(na
         )
         assert learner.name == name
         assert hasattr(learner.bootstrap, "network") == entry.network
+        if beta := {"GES": paper.BETA, "TDC": paper.BETA_TDC}.get(name):
+            assert (learner.rule.step.alpha, learner.rule.step.beta) == (3e-7, beta)
         if entry.network:
             assert learner.bootstrap.fits == NETWORKS[network].fits
         read |= experiment.read & OPTIONAL
@@ -57,7 +59,8 @@ def test_each_purpose_of_a_seed_has_a_generator_of_its_own(monkeypatch):
     seen = []
     entry = replace(LEARNERS["ES"], make=lambda *given: seen.extend(given[-1]))
     monkeypatch.setitem(LEARNERS, "ES", entry)
-    prepare(Experiment(episodes=1, seed=5), CONTROLLER)
+    _, weights, _ = prepare(Experiment(episodes=1, seed=5), CONTROLLER)
+    assert (weights.w == paper.W_INIT).all()
     expected = map(np.random.default_rng, np.random.SeedSequence(5).spawn(3))
     drawn = [one.normal() for one in expected]
     assert [used.normal() for used in seen][1:] == drawn[1:]  # the noise was drawn before
