@@ -98,14 +98,14 @@ def interpreted(tmp_path, monkeypatch) -> Iterator[None]:
 
     Only in the test that asks for it: what comes after it in its module may be about machine code.
     """
-    before = set(sys.modules)
+    for name in [one for one in sys.modules if one.startswith("riccati_")]:
+        monkeypatch.delitem(sys.modules, name)  # machine code, until the test has ended
     monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
     monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path / "interpreted"))
     with np.errstate(all="ignore"):
         yield
-    for name in set(sys.modules) - before:
-        if name.startswith("riccati_"):
-            del sys.modules[name]
+    for name in [one for one in sys.modules if one.startswith("riccati_")]:
+        del sys.modules[name]
 
 
 @pytest.fixture(scope="session")
