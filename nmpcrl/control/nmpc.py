@@ -27,7 +27,7 @@ from nmpcrl.control.solvers import Asked, Riccati, Solver, solver_of
 from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
-from nmpcrl.control.vectors import floats, positive_integer
+from nmpcrl.control.vectors import floats, integer
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
@@ -193,7 +193,7 @@ class Nmpc(Described):
             if (thetas[k] < self._bending.least).any():
                 self._bending.judge(states[k], thetas[k], known[min(k, len(known) - 1)])
         variant = self._free if actions is None else self._fixed
-        threads = cpu_count() if threads is None else positive_integer("threads", threads)
+        threads = cpu_count() if threads is None else integer("threads", threads)
         return solve_many(variant, usable, states, thetas, warm_starts, actions, known, threads)
 
     def value_hessian(self, solution: Solution) -> Matrix:
@@ -281,7 +281,7 @@ class Nmpc(Described):
         """Compile solver, derivatives, plant and cost now, and not where they are first used.
 
         It takes half a minute, once on a machine, and says on standard error what it does and for
-        how long: numba's typing takes two thirds, LLVM one. CasADi's solvers take no time.
+        how long: numba's typing takes one half, LLVM the other. CasADi's solvers take no time.
         The loop of `learning` is compiled at the first run.
         """
         if isinstance(self._free.solver, Compiled):

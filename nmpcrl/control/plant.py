@@ -12,7 +12,7 @@ from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
-from nmpcrl.control.vectors import box, positive_integer
+from nmpcrl.control.vectors import box, integer
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 
@@ -67,7 +67,7 @@ class Plant(Described):
             raise ValueError("a plant needs a state: state_names is empty")
         if not 0 < self.period < np.inf:
             raise ValueError(f"plant.period = {self.period} must be a positive number of seconds")
-        positive_integer("plant.substeps", self.substeps)
+        integer("plant.substeps", self.substeps)
         _ = self._derivative  # refused here, and not where it is first used
 
     def __getstate__(self) -> dict[str, Any]:

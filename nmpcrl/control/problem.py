@@ -22,7 +22,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.blocks import Blocks, by_name, numbers
 from nmpcrl.control.content import Described
 from nmpcrl.control.expression import expression
-from nmpcrl.control.vectors import box, positive_integer, read_only, spread
+from nmpcrl.control.vectors import box, integer, read_only, spread
 
 SMALL, LARGE = 1e-2, 1e4  # sizes of states and rows between which solvers need no scaling
 LEAST = 1e-200  # curvature or slope that counts
@@ -143,9 +143,9 @@ class Problem(Described):
             scale: typical sizes of the states, a number or one a state, used as units; by default
                 1, or sizes read from the costs where these lie below 0.01 or above 10,000.
         """
-        self.states = positive_integer("states", states)
-        self.inputs = positive_integer("inputs", inputs)
-        self.horizon = positive_integer("horizon", horizon)
+        self.states = integer("states", states)
+        self.inputs = integer("inputs", inputs)
+        self.horizon = integer("horizon", horizon)
         if not 0 < gamma <= 1:
             raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
         self.gamma = float(gamma)

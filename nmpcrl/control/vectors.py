@@ -22,10 +22,10 @@ def step_size(name: str, number: Any) -> None:
         raise ValueError(f"{name} = {number!r} must be a finite number, 0 or more")
 
 
-def positive_integer(name: str, number: Any) -> int:
-    """A whole number, 1 or more; ValueError for any other."""
-    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
-        raise ValueError(f"{name} = {number!r} must be a whole number, 1 or more")
+def integer(name: str, number: Any, least: int = 1) -> int:
+    """A whole number, `least` or more; ValueError for any other."""
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
+        raise ValueError(f"{name} = {number!r} must be a whole number, {least} or more")
     return int(number)
 
 

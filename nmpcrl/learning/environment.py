@@ -105,9 +105,9 @@ def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
 
 
 def unusable(state: Vector, cost: float, nmpc: Nmpc | None, *, end: bool) -> str:
-    """Why nothing is learned from a step: its cost, or a state in which no plan can begin.
+    """Why a step ends its episode as a failed solve does; "" if it does not.
 
-    "" if something is; an episode may end in any finite state.
+    Its cost is not finite, or no plan can begin in its state; an episode may end in any finite one.
     """
     largest = sys.float_info.max if nmpc is None or end else nmpc.farthest
     if all(abs(number) <= largest for number in state.tolist()):

@@ -14,7 +14,7 @@ from nmpcrl.control import Nmpc, Policy
 from nmpcrl.control.bending import Bending
 from nmpcrl.control.policy import Data
 from nmpcrl.control.solution import short
-from nmpcrl.control.vectors import floats, spread
+from nmpcrl.control.vectors import floats, integer, spread
 from nmpcrl.learning.batches import lstd_q
 from nmpcrl.learning.environment import GymnasiumEnv, StepFunction, stream
 from nmpcrl.learning.episode import Episode
@@ -124,9 +124,7 @@ def learn(
     if not isinstance(nmpc, Nmpc):
         raise ValueError(f"nmpc = {nmpc!r} must be an Nmpc: write learn(Nmpc(problem), ...)")
     base = _learner(nmpc, learner, options)
-    for name, number in (("confirm", confirm), ("seed", seed)):
-        if not isinstance(number, int | np.integer) or number < 0:
-            raise ValueError(f"{name} = {number!r} must be a whole number, 0 or more")
+    confirm, seed = integer("confirm", confirm, 0), integer("seed", seed, 0)
     if resume is not None and theta is not None:
         raise ValueError("a resumed run begins with its own theta: leave theta= out")
     if resume is not None and isinstance(resume.weights.memory, Best) != undo:

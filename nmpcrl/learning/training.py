@@ -13,7 +13,7 @@ from nmpcrl.control import Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.policy import Data, forecasts
 from nmpcrl.control.solution import short
-from nmpcrl.control.vectors import positive_integer
+from nmpcrl.control.vectors import integer
 from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.environment import (
     GymnasiumEnv,
@@ -97,7 +97,7 @@ class Exploration:
         episodes from `first` on go on where an earlier run of as many ended.
         """
         if noise is None:
-            count, steps = positive_integer("episodes", episodes), positive_integer("steps", steps)
+            count, steps = integer("episodes", episodes), integer("steps", steps)
             spread = np.atleast_1d(np.array(deviation, float))
             if spread.ndim != 1 or not ((spread >= 0) & (spread < np.inf)).all():
                 raise ValueError(

@@ -92,7 +92,7 @@ options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
 # To be called from machine code alone: a wrapper for Python takes a quarter of the compiling.
 inner: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 allocating = njit(**inner, **options)
-merged = njit(inline="always", **options)  # a part of its one caller, compiled once and with it
+merged = njit(inline="always", **options)  # no function by itself: compiled with each caller
 inlined = njit(_nrt=False, **inner, **options)
 
 

@@ -7,7 +7,7 @@ from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solvers import stages
 from nmpcrl.control.solvers.riccati import NOTICE, TEXTS, Riccati
-from nmpcrl.control.vectors import positive_integer
+from nmpcrl.control.vectors import integer
 
 TEXT = """import numpy as np
 from numba import njit
@@ -43,7 +43,7 @@ def real_time(steps: int = 1) -> Riccati:
     `value` is that of the plan, and `features` holds with its multipliers, as far as these are
     right; further derivatives need an optimum. A cold solve, and one whose steps fail, go on to it.
     """
-    return Riccati(code=partial(_limited, positive_integer("steps", steps)))
+    return Riccati(code=partial(_limited, integer("steps", steps)))
 
 
 def _limited(steps: int, problem: Problem) -> Any:

@@ -22,7 +22,7 @@ from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Ipopt, Program, reorder
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Asked, Prepared, Solver
 from nmpcrl.control.solvers.starts import LAST, MOST, cold_inputs, random_inputs
-from nmpcrl.control.vectors import positive_integer
+from nmpcrl.control.vectors import integer
 
 SEVERAL = 5  # cold starts besides the one that feedback holds
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
@@ -90,7 +90,7 @@ class Riccati(Solver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if positive_integer("starts", self.starts) > MOST:
+        if integer("starts", self.starts) > MOST:
             raise ValueError(f"starts = {self.starts} must be at most {MOST}")
 
     def prepare(self, ocp: Ocp) -> Prepared:
