@@ -40,7 +40,7 @@ lab: .venv-lab/ready  ## Open the chapters in JupyterLab, which has an environme
 	@NMPCRL_RUNS="$(or $(NMPCRL_RUNS),$(CURDIR)/runs)" .venv-lab/bin/jupyter lab --preferred-dir=book
 
 study: .venv/ready  ## Train the whole study, or what is missing of it: hours, and it can be interrupted
-	@$(BIN)/python -m nmpcrl study
+	@$(BIN)/python -m nmpcrl investigate main_study
 
 bench: .venv/ready  ## Measure how long learning steps and solves take
 	@$(BIN)/python -m nmpcrl bench

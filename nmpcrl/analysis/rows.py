@@ -109,13 +109,3 @@ def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment
     unknown = {"training_cost": np.nan}
     arms = {e: rows.get(frozen_arm(e), unknown) for e in rows}
     return {e: one["training_cost"] / arms[e]["training_cost"] for e, one in rows.items()}
-
-
-def tidy(summary: RunSummary) -> pd.DataFrame:
-    """One row an episode: learner, layout, decay, seed, the columns of numbers, and theta."""
-    named = {name: summary.experiment[name] for name in ("learner", "layout", "decay", "seed")}
-    columns = {name: column for name, column in summary.episodes.items() if column.ndim == 1}
-    names = (f"theta_{name}" for name in paper.THETA_NAMES)
-    theta = dict(zip(names, summary.episodes["theta"].T, strict=True))
-    episodes = {"episode": range(summary.experiment["episodes"])}
-    return pd.DataFrame(named | episodes | columns | theta)

@@ -12,7 +12,6 @@ from nmpcrl.commands.investigate import investigate
 from nmpcrl.commands.refusals import Commands
 from nmpcrl.commands.runs import runs
 from nmpcrl.commands.show import show
-from nmpcrl.commands.study import study
 from nmpcrl.commands.suite import suite
 from nmpcrl.commands.train import train
 from nmpcrl.commands.verify import verify
@@ -39,5 +38,5 @@ def main() -> None:
         raise click.ClickException(f"NMPCRL_RUNS = {runs!r} must be a folder")
 
 
-for command in (train, runs, show, study, verify, bench, suite, investigate, grade, wasm):
+for command in (train, runs, show, investigate, verify, bench, suite, grade, wasm):
     main.add_command(command)

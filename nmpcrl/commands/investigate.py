@@ -1,4 +1,4 @@
-"""`nmpcrl investigate`: make, publish and judge the rows of an investigation."""
+"""`nmpcrl investigate`: make, publish and judge the runs of the study, or rows like them."""
 
 from pathlib import Path
 from pkgutil import resolve_name
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nmpcrl.commands import study
 from nmpcrl.commands.options import WORKERS
 
 if TYPE_CHECKING:
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
     from nmpcrl.studies.investigation import Investigation
 
-BOOK = {  # the investigations of the book, in `nmpcrl.studies`
+BOOK = {  # the investigations of the book beside the main study, in `nmpcrl.studies`
     "agents": "agents:SAC_AND_TD3",
     "interventions": "interventions:INTERVENTIONS",
     "other_problems": "other_problems:OTHER_PROBLEMS",
@@ -37,16 +38,24 @@ def investigate(
 ) -> None:  # fmt: skip
     """Make and judge the rows of an investigation.
 
-    NAME is one of the book's (agents, interventions, other_problems, population,
-    population_layouts, remedies, worlds), or a Python file that defines one.
-    Each row is stored as soon as it is made, so a run can be interrupted.
+    NAME is one of the book's (main_study, agents, interventions, other_problems,
+    population, population_layouts, remedies, worlds), or a Python file that
+    defines one. Each row is stored as soon as it is made, so that it can be
+    interrupted. The rows of main_study are runs; its parts are main, controls
+    and the variants, and with --part they are published beside the others.
 
     \b
     Example:
-      nmpcrl investigate worlds --dry-run
+      nmpcrl investigate main_study --dry-run
       nmpcrl investigate worlds --part moving
       nmpcrl investigate my_study.py --publish
     """
+    if name == "main_study":
+        if judge:
+            study.judge()
+        else:
+            study.train(parts, workers, dry_run=dry_run, publish=publish)
+        return
     from nmpcrl.study import published
     from nmpcrl.study.parameters import one_of
 
@@ -62,13 +71,13 @@ def investigate(
             click.echo(f"{one.publish()}: published")
             if one.unregistered or not one.registered:
                 click.echo(
-                    f"not registered: commit {name} before its rows are made (delete {one.log} to"
-                    " make them again)"
+                    f"not registered: commit {name} before its rows are made (delete {one.log} and"
+                    " the published files to make them again)"
                 )
     _say(one, one.table() if judge or publish else made)
     registered = published.about(one.name, one.where).get("registered", "")
     if judge and one.source and one.registered != registered:
-        click.echo(f"not registered: the table is older than {name}; --publish makes it anew")
+        click.echo(f"not registered: the table is older than {name}; delete it to publish it anew")
 
 
 def _load(name: str) -> "Investigation":
@@ -79,20 +88,23 @@ def _load(name: str) -> "Investigation":
         found: Investigation = resolve_name(f"nmpcrl.studies.{BOOK[name]}")
         return found
     if not name.endswith(".py"):
-        raise click.ClickException(f"{name!r} must be one of {', '.join(BOOK)}, or a .py file")
+        known = ", ".join(["main_study", *BOOK])
+        raise click.ClickException(f"{name!r} must be one of {known}, or a .py file")
     return of_file(Path(name))
 
 
 def _report(one: "Investigation", parts: tuple[str, ...]) -> None:
     """The stored rows of each part, and the time that the others take."""
+    from nmpcrl.study.refusal import Refusal
+
     for part in parts:
-        rows, missing, seconds, unknown = one.price(part)
-        said = [f"{rows - missing} of {rows} rows are stored"] if rows else []
-        if missing:
-            said.append(f"the others take about {max(seconds / 60, 0.1):.1f} minutes of one core")
-        if unknown:
-            said.append(f"with the arms of earlier rows, for {unknown}" if rows else unknown)
-        click.echo(f"{part}: {'; '.join(said)}")
+        try:
+            rows, missing, seconds = one.price(part)
+        except Refusal as error:
+            click.echo(f"{part}: {error}")
+            continue
+        minutes = f"; the others take about {max(seconds / 60, 0.1):.1f} minutes of one core"
+        click.echo(f"{part}: {rows - missing} of {rows} rows are stored{minutes * (missing > 0)}")
 
 
 def _say(one: "Investigation", table: "pd.DataFrame") -> None:

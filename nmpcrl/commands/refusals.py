@@ -12,6 +12,7 @@ INSTEAD = {  # of commands that earlier versions had
     "completion": "click writes the script: `_NMPCRL_COMPLETE=bash_source nmpcrl`",
     "evaluate": "use `nmpcrl show`",
     "remedies": "use `nmpcrl investigate remedies`",
+    "study": "use `nmpcrl investigate main_study`",
     "world": "use `nmpcrl investigate worlds`",
 }
 

@@ -54,15 +54,6 @@ NAMES = list(Condition._fields)
 ROWS_OF = "rows of "  # before the name of an array: which rows of the table its entries belong to
 
 
-class Price(NamedTuple):
-    """The work that a part still takes."""
-
-    rows: int
-    missing: int  #: rows
-    seconds: float  #: of processor time
-    unknown: str  #: why the arms are not known yet, if they are not
-
-
 @dataclass(frozen=True)
 class Part:
     """Every arm in every place with every seed.
@@ -285,23 +276,17 @@ class Investigation:
             raise TypeError(f"{row!r} is no row: the function of part {one.part!r} returns a dict")
         return {"seconds": time.process_time() - began} | row
 
-    def price(self, part: str) -> Price:
-        """The number of rows of a part, and the processor time of the missing ones.
+    def price(self, part: str) -> tuple[int, int, float]:
+        """How many rows a part has, how many are missing, and their processor time [s].
 
-        While the arms are unknown, the published arms of earlier epochs take their place.
+        A `Refusal` if an arm depends on unknown rows.
         """
-        known, one, unknown = pd.concat([self.made(), self._published()]), self.parts[part], ""
+        known, one = pd.concat([self.made(), self._published()]), self.parts[part]
         known = known[known.part == part]
-        try:
-            rows = [*self.conditions(part)]
-        except Refusal as error:
-            arms, unknown = known.arm.unique(), str(error)
-            rows = [Condition(part, arm, *at) for arm in arms for at in one.order(arm)]
-        made = self._lines()
-        missing = [each.arm for each in rows if self.key(each) not in made]
         means = known.groupby("arm").seconds.mean().dropna() if "seconds" in known else {}
-        seconds = sum(means.get(arm, one.seconds * one.episodes) for arm in missing)
-        return Price(len(rows), len(missing), float(seconds), unknown)
+        missing = self.missing(part)
+        seconds = sum(means.get(each.arm, one.seconds * one.episodes) for each in missing)
+        return len(self.conditions(part)), len(missing), float(seconds)
 
     def answers(self, table: pd.DataFrame) -> dict[str, Answer]:
         """The answers of a table to all questions, by name."""
@@ -315,12 +300,11 @@ class Investigation:
         """Add the complete arms that were made here to the published table, or raise Unpublishable.
 
         Rows of earlier epochs are replaced part by part, once every arm of the part is complete.
-        A table whose every row was made again, with equal numbers, since a later commit registered
-        parts and questions, is registered by that commit.
+        The commit that registers a table is the one that its first rows name.
         """
         there, made = self._published(), self.made()
         known = published.about(self.name, self.where)
-        blocks, replaced, same = list[pd.DataFrame](), set[str](), dict[Any, pd.DataFrame]()
+        blocks, replaced = list[pd.DataFrame](), set[str]()
         for part, rows in made.groupby("part", sort=False) if len(made) else ():
             old, arms = there[there.part == part], self._complete(str(part), rows)
             if len(old) and not self.is_current(str(part)):
@@ -331,20 +315,13 @@ class Investigation:
                 names = [name for name in old if name != "seconds"]
                 for arm in filter(arms.__contains__, old.arm.unique()):
                     before = old[old.arm == arm][names].reset_index(drop=True)
-                    same[part, arm] = again = arms.pop(arm)
-                    if not before.equals(again[names]):
+                    if not before.equals(arms.pop(arm)[names]):
                         raise Unpublishable(
                             f"{arm} of the part {part!r} is published with other numbers, and these"
                             " stay: give the investigation another name, or delete its table and"
                             " manifest"
                         )
             blocks += arms.values()
-        registered = "" if self.unregistered else self.registered
-        old_arms = [*there[["part", "arm"]].drop_duplicates().itertuples(index=False, name=None)]
-        if registered and registered != known.get("registered") and {*old_arms} == {*same}:
-            blocks, replaced = [*map(same.__getitem__, old_arms), *blocks], {*there.part}
-        elif known:
-            registered = known.get("registered", "")
         if not blocks:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
         added, kept = pd.concat(blocks), self._with_lists(there)[~there.part.isin(replaced)]
@@ -359,7 +336,7 @@ class Investigation:
             table,
             arrays,
             batch=made_here() | {"epochs": {**self.epochs}, "rows": counts},
-            registered=registered,
+            registered=None if known else "" if self.unregistered else self.registered,
             earlier=published.without(known.get("batches", []), replaced),
             where=self.where,
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import metrics, rows
-from nmpcrl.analysis.rows import experiment_of, row, table, tidy
+from nmpcrl.analysis.rows import experiment_of, row, table
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, paper, run
@@ -95,16 +95,13 @@ def test_what_was_never_reached_is_not_known():
     np.testing.assert_array_equal(found.episodes["theta"][0], exploding.steps["theta"][-1])
 
 
-def test_a_row_measures_as_the_metrics_do_and_a_tidy_table_has_a_row_an_episode(records, short):
+def test_a_row_measures_as_the_metrics_do(records, short):
     found = row(short)
     for name in ("final_cost", "initial_cost", "late_cost_range"):
         assert found[name] == getattr(metrics, name)(records)
     theta = [found[f"theta_{i}"] for i in range(9)]
     np.testing.assert_array_equal(theta, metrics.final_theta(records))
     assert (found["learner"], found["seed"]) == ("RDES", 0)
-    frame = tidy(short)
-    np.testing.assert_array_equal(frame["theta_c"], short.episodes["theta"][:, -1])
-    assert frame.learner.tolist() == ["RDES"] * 4
 
 
 @pytest.mark.parametrize("lost", [slice(4, None), slice(3, None), slice(2, None)])

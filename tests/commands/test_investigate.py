@@ -1,5 +1,6 @@
 """`nmpcrl investigate` with a reader's own file, and files that are none."""
 
+import shutil
 import subprocess
 
 import pytest
@@ -62,6 +63,8 @@ def test_a_committed_file_is_registered_by_its_commit(own, command):
     said = command("investigate", str(own), "--judge").stdout
     assert "not registered: the table is older than" in said
     git("commit", "-qam", "Ask otherwise")
+    shutil.rmtree(own.parent / "published")
+    published._manifest.cache_clear()
     assert "published" in command("investigate", str(own), "--publish", "--workers", "1").stdout
     entry = published.about(of_file(own).name, own.parent / "published")
     assert entry["registered"] == git("rev-parse", "HEAD")

@@ -1,4 +1,4 @@
-"""`nmpcrl study`, `verify` and `bench`, on a study of six short runs."""
+"""`nmpcrl investigate main_study` and `verify`, on a study of six short runs."""
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
@@ -18,6 +18,7 @@ STUDY = {
     **dict.fromkeys(sweep(learner=("ES", "frozen"), horizon=5, **SHORT), "N = 5"),
 }
 SEARCHED = published.load().searches
+STUDY_OF = ("investigate", "main_study")
 CELL = ["variant", "learner", "layout", "decay", "seed"]
 
 
@@ -26,7 +27,7 @@ def small(monkeypatch, timings, trains_here):
     """A study of six short runs, trained in this process, without searches and measured times."""
     times = timings
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
-    monkeypatch.setattr(main_study, "search_all", lambda _: SEARCHED)
+    monkeypatch.setattr(main_study, "parallel", lambda *_: SEARCHED.items())
     monkeypatch.setattr(main_study, "time_learners_repeatedly", lambda: times)
 
 
@@ -42,7 +43,7 @@ def published_here(command, small, ready, tmp_path):
     if not any(ready.iterdir()):
         with ThreadPoolExecutor(1) as one:
             fetch_summaries(STUDY, executor=one, progress=False)
-        assert command("study", "--publish").exit_code == 0
+        assert command(*STUDY_OF, "--publish").exit_code == 0
         shutil.copytree(tmp_path, ready, dirs_exist_ok=True)
     shutil.copytree(ready, tmp_path, dirs_exist_ok=True)
     return {e: SUMMARIES.read(e) for e in STUDY}
@@ -55,16 +56,16 @@ def done(command, *words, code=0):
 
 
 def test_study_says_what_is_missing_trains_a_part_and_then_the_rest(command, small, monkeypatch):
-    assert "0 of 6 runs are stored" in done(command, "study", "--dry-run")
-    done(command, "study", "--part", "N = 5", "--workers", "1")
+    assert "0 of 6 runs are stored" in done(command, *STUDY_OF, "--dry-run")
+    done(command, *STUDY_OF, "--part", "N = 5", "--workers", "1")
     assert {STUDY[e] for e in STUDY if SUMMARIES.is_stored(e)} == {"N = 5"}
     with monkeypatch.context() as patch:
         patch.setattr(store, "run", raising(ArithmeticError("a mistake")))
-        said = done(command, "study", code=1)
+        said = done(command, *STUDY_OF, code=1)
     assert "4 of 6 failed" in said
     assert "ArithmeticError: a mistake" in said
-    done(command, "study")
-    assert "6 of 6 runs are stored" in done(command, "study", "--dry-run")
+    done(command, *STUDY_OF)
+    assert "6 of 6 runs are stored" in done(command, *STUDY_OF, "--dry-run")
 
 
 def test_verify_compares_with_the_published_runs_and_names_what_contradicts(

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -12,8 +11,7 @@ from builders import assert_same_numbers
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.study import cluster, run, sweep
-from nmpcrl.study.refusal import Refusal
+from nmpcrl.study import run, sweep
 
 distributed = pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
 
@@ -75,7 +73,8 @@ def test_a_killed_worker_loses_no_run_and_no_bit(dask, tmp_path):
 
     killer = threading.Thread(target=kill_one_at_work)
     killer.start()
-    with cluster.executor(address, 240.0) as executor:
+    with distributed.Client(address) as client:
+        executor = client.get_executor(pure=False)
         found = fetch_summaries(SIX, executor=executor, progress=False)
     killer.join()
     assert len(began()) == 7  # the worker's run is begun again, and no other
@@ -83,18 +82,3 @@ def test_a_killed_worker_loses_no_run_and_no_bit(dask, tmp_path):
         assert_same_numbers(found[experiment], summarise(run(experiment)))
         assert SUMMARIES.is_stored(experiment)
     assert not [*(tmp_path / "elsewhere").rglob("*.npz")]
-
-
-def refused(address: str, patience: float, sentence: str) -> None:
-    with pytest.raises(Refusal, match=sentence), cluster.executor(address, patience):
-        pass
-
-
-@pytest.mark.parametrize("nobody", ["", "tcp://nowhere:1", "x://y:1"])
-def test_where_no_scheduler_answers_nobody_is_waited_for(nobody):
-    refused(nobody, 1.0, f"no scheduler answers at '{nobody}'")
-
-
-def test_without_dask_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    refused("127.0.0.1:8786", 1.0, r"pip install 'nmpcrl\[cluster\]'")
