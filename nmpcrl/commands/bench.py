@@ -8,8 +8,7 @@ import click
 @click.option("--short", "length", flag_value="short", help="Measure what the book needs.")
 @click.option("--smoke", "length", flag_value="smoke", help="Only check that it works.")
 @click.option("--again", is_flag=True, help="Measure even if a table is stored.")
-@click.option("--publish", is_flag=True, help="Only time the learners, and publish C3 and C4.")
-def bench(length: str, again: bool, publish: bool) -> None:
+def bench(length: str, again: bool) -> None:
     """Measure how long learning steps and solves take.
 
     The table of learning steps is stored with the runs, and read from there.
@@ -18,13 +17,6 @@ def bench(length: str, again: bool, publish: bool) -> None:
     Example:
       nmpcrl bench --short
     """
-    if publish:
-        _publish_timing()
-    else:
-        _print_times(length, again=again)
-
-
-def _print_times(length: str, *, again: bool) -> None:
     from nmpcrl.bench import measurement, solves
     from nmpcrl.study import paper
 
@@ -37,16 +29,3 @@ def _print_times(length: str, *, again: bool) -> None:
     )
     click.echo("\nWarm solves of the same problems [us], with the gradient of the value:\n")
     click.echo(solves.compare(solves.solvers(), paper.nmpc()).round(2).to_string())
-
-
-def _publish_timing() -> None:
-    """Measure and publish the verdicts on time, if they can be decided on this machine."""
-    from nmpcrl.claims.verdict import UNDECIDABLE
-    from nmpcrl.studies.main_study import publish_timing
-
-    judged = publish_timing()
-    for verdict in judged:
-        ratios = ", ".join(f"{ratio} with {solver}" for solver, ratio in verdict.numbers.items())
-        click.echo(f"{verdict.claim}: {verdict.outcome}. In steps of ES: {ratios}")
-    if UNDECIDABLE in {verdict.outcome for verdict in judged}:
-        raise click.ClickException("nothing is published: try again when the machine is idle")

@@ -1,6 +1,5 @@
-"""`nmpcrl runs`: the stored runs, as a table or as JSON."""
+"""`nmpcrl runs`: the stored runs as a table."""
 
-import json
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -18,39 +17,31 @@ LISTED = 5  # names in a refusal
 @click.argument("name", default="")
 @click.option("--sort", type=click.Choice(COLUMNS), default="run")
 @click.option("--reverse", is_flag=True, help="Largest first.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
-def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
+def runs(name: str, sort: str, reverse: bool) -> None:
     """List the stored runs, or those whose names begin with NAME.
 
     NAME may have the wildcards *, ? and [...]. The column cost has the noise-free
     cost, which is the mean of the last three rollouts.
 
-    With --json, each run is an object with its name `run`, its `path`, the fields
-    of its `experiment`, and its `facts`: how it stopped (`stopped`), `final_cost`,
-    `seconds`, the `solver`, and where it was trained. A number that is not finite
-    is null. Runs of a `Trial` are not listed.
+    Runs of a `Trial` are not listed. In Python, `nmpcrl.study.stored()` has all
+    fields and facts of each run.
 
     \b
     Example:
       nmpcrl runs GES-A --sort cost
-      nmpcrl runs "*-episode-seed0" --json
+      nmpcrl runs "*-episode-seed0"
     """
     from nmpcrl.study.files import folder
     from nmpcrl.study.lock import is_accepted, warn_of_changes
     from nmpcrl.study.store import stored
 
     found = {path: about for path, about in stored().items() if begins(path, name)}
-    rows = {path: _row(path, one.experiment, one.facts) for path, one in found.items()}
-    ordered = sorted(found, key=lambda path: rows[path][sort], reverse=reverse)
-    if as_json:
-        objects = [{"run": p.stem, "path": str(p), **found[p]._asdict()} for p in ordered]
-        finite = json.loads(json.dumps(objects), parse_constant=lambda _: None)
-        click.echo(json.dumps(finite, indent=1))
-    elif found:
+    if found:
         import pandas as pd
 
-        table = pd.DataFrame([rows[path] for path in ordered])
-        click.echo(table.to_string(index=False, float_format="{:.1f}".format))
+        table = pd.DataFrame([_row(path, *one) for path, one in found.items()])
+        ordered = table.sort_values(sort, ascending=not reverse, kind="stable")
+        click.echo(ordered.to_string(index=False, float_format="{:.1f}".format))
     else:
         click.echo(f"no run {name!r} is stored in {folder()}; `nmpcrl train` trains one")
     others = sum(not is_accepted(one.facts.get("sources")) for one in found.values())

@@ -13,21 +13,19 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
-from nmpcrl.analysis.search import Search, SearchResult, search_all
+from nmpcrl.analysis.search import BUDGET, SearchResult, search
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.learners import time_learners_repeatedly
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import Measurement, measured
-from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import BITS, COLUMNS, FOLLOWED, Evidence, Published
-from nmpcrl.claims.rule import judge
-from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.study import design, paper
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import Experiment, frozen_arm
+from nmpcrl.study.jobs import parallel
 from nmpcrl.study.parameters import one_of
-from nmpcrl.study.provenance import made_here
+from nmpcrl.study.provenance import EPOCHS, made_here
 from nmpcrl.study.published import Unpublishable
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import fetch
@@ -73,7 +71,8 @@ def publish_study(
     records = fetch(published.AUDITED)
     audit = measured(published.AUDITED, records, dropped_curvature(records))
     place = publish_runs(runs, variants, anew=anew, audit=audit)
-    publish_searches(search_all([*map(Search, design.LAYOUTS)]))
+    best = dict(parallel(search, design.LAYOUTS))
+    publish_searches({layout: best[layout] for layout in design.LAYOUTS})
     if timings is not None:
         publish_times(timings)
     return place
@@ -92,7 +91,8 @@ def publish_runs(
     earlier epochs are replaced, and must be whole; all published runs are forgotten if `anew`.
     """
     earlier = Published() if anew else published.load()
-    known, older = {*earlier.rows, *runs}, {p for p in earlier.parts if not earlier.is_current(p)}
+    known = {*earlier.rows, *runs}
+    older = {part for part in earlier.parts if store.epochs(earlier.about, part) != EPOCHS}
     for e in runs:
         part = earlier.variants.get(e)
         if part is not None and part not in older:
@@ -122,27 +122,19 @@ def _hours(runs: pd.DataFrame) -> float:
     return float(runs.seconds.sum() / 3600)
 
 
-def publish_searches(searches: Mapping[Search, SearchResult]) -> Path:
-    """Replace the published searches."""
-    rows = [asdict(one) | asdict(result) for one, result in searches.items()]
+def publish_searches(searches: Mapping[str, SearchResult]) -> Path:
+    """Replace the published searches by those of some layouts, with seed 0 and `BUDGET`."""
+    made = {"seed": 0, "budget": BUDGET}
+    rows = [{"layout": one, **made, **asdict(result)} for one, result in searches.items()]
     return _written(published.SEARCHES, pd.DataFrame(rows), made_here())
 
 
 def publish_times(timings: pd.DataFrame) -> Path:
-    """Replace the published times by times of `time_learners` that were taken here."""
-    return _written(published.TIMINGS, timings, made_here())
+    """Replace the published times by times of `time_learners` that were taken here.
 
-
-def publish_timing() -> tuple[Verdict, ...]:
-    """Time the learners here, and publish the times if they decide all claims about time.
-
-    The verdicts on these claims are returned.
+    Where the machine was busy, `publish_times(time_learners_repeatedly())` takes them once more.
     """
-    timings = time_learners_repeatedly()
-    judged = judge(BY_TIME, timings=timings)
-    if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
-        publish_times(timings)
-    return judged
+    return _written(published.TIMINGS, timings, made_here())
 
 
 def _written(

@@ -7,15 +7,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import SOLVES, scaled, timings
+from builders import scaled
 
 from nmpcrl.analysis.rows import row
-from nmpcrl.analysis.search import Search, SearchResult
+from nmpcrl.analysis.search import SearchResult
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import Measurement
 from nmpcrl.claims.published import FOLLOWED, Published, load
-from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import main_study
 from nmpcrl.study import Experiment, paper, run, sweep
 from nmpcrl.study import published as store
@@ -32,7 +31,7 @@ RUNS = (
 )
 LABELS = {e: "main" if e.horizon == paper.HORIZON else "N = 2" for e in RUNS}
 TIMES = pd.DataFrame({"solver": ["ipopt"], "learner": ["ES"], "ratio": [1 / 3]})
-SEARCHES = {Search("B", budget=40): SearchResult((0.1, 1 / 3), 31, (1, 7), (1 / 3, 0.1))}
+SEARCHES = {"B": SearchResult((0.1, 1 / 3), 31, (1, 7), (1 / 3, 0.1))}
 AUDIT = Measurement(0.1, 2 / 3, 0.5)
 
 
@@ -157,7 +156,7 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
     forget()
     found = load()
     assert list(found.rows) == list(RUNS)
-    assert [found.is_current(part) for part in ("main", "N = 2")] == [True, False]
+    assert [store.is_current("runs", part) for part in ("main", "N = 2")] == [True, False]
     for e in RUNS:
         factor = 2.0 if e in main else 1.0
         np.testing.assert_equal(
@@ -170,19 +169,3 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
     )
     with pytest.raises(Unpublishable, match="is published already, in the part 'main'"):
         main_study.publish_runs(anew, main)
-
-
-@pytest.mark.parametrize(
-    ("width", "outcomes"), [(0.02, [PARTLY, REPRODUCED]), (0.07, [UNDECIDABLE, REPRODUCED])]
-)
-def test_times_are_published_if_they_decide_all_claims_about_time(
-    known, monkeypatch, width, outcomes
-):
-    monkeypatch.setattr(
-        main_study,
-        "time_learners_repeatedly",
-        lambda: timings(0.65, width=width, waited=0.5, solvers=["ipopt"]),
-    )
-    assert [verdict.outcome for verdict in main_study.publish_timing()] == outcomes
-    assert (len(load().timings) == len(SOLVES)) == (UNDECIDABLE not in outcomes)
-    assert list(load().rows) == list(RUNS)
