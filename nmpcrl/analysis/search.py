@@ -5,7 +5,7 @@ least cost. `search` is one long CMA-ES in a layout: a lower bound of the possib
 """
 
 from bisect import bisect
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +14,6 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
-from nmpcrl.study.jobs import parallel
-from nmpcrl.study.parameters import LARGEST_SEED, one_of, whole
 
 SCALE: Vector = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # bounds of theta
@@ -25,8 +23,6 @@ WIDEST = 0.35  # last theta_c of the grid: d_o, where the penalty vanishes  # de
 DECAY, FADING = 0.602, 0.101  # SPSA: exponents of the step and of the perturbation
 SPREAD = 0.3  # CMA-ES: of the first rollouts, in `SCALE`s
 BUDGET = 2000  # rollouts of a published long search
-CHECK = 200  # rollouts that a build repeats of a published search
-LEAST = 40  # rollouts of the shortest search: the first one and some generations
 Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
 
 
@@ -167,20 +163,6 @@ SEARCHES: dict[str, Callable[..., Vector]] = {  # (cost, start, budget, seed, se
 
 
 @dataclass(frozen=True)
-class Search:
-    """The name of a long search; ParameterError for a field out of its range."""
-
-    layout: str = "A"
-    seed: int = 0  # of the candidates
-    budget: int = BUDGET  # rollouts without noise
-
-    def __post_init__(self) -> None:
-        one_of(paper.LAYOUTS).check("layout", self.layout)
-        whole(0, LARGEST_SEED - 1).check("seed", self.seed)  # CMA-ES gets seed + 1
-        whole(LEAST, 100_000).check("budget", self.budget)
-
-
-@dataclass(frozen=True)
 class SearchResult:
     """The result of a search and each improvement; the first rollout is under theta_init."""
 
@@ -209,14 +191,11 @@ class SearchResult:
         return self.best[bisect(self.rollouts, rollouts) - 1]
 
 
-def search(wanted: Search) -> SearchResult:
+def search(layout: str, budget: int = BUDGET, seed: int = 0) -> SearchResult:
     """The theta of least noise-free cost in a layout that one CMA-ES finds from theta_init."""
-    controller = paper.nmpc(wanted.layout)
-    start = np.array(paper.THETA_INIT)
-    tried = Rollouts(
-        lambda theta: evaluate(controller, theta, paper.STEPS).cost, start, wanted.budget
-    )
-    tried.descend(SPREAD, wanted.seed + 1, least=0)
+    controller, start = paper.nmpc(layout), np.array(paper.THETA_INIT)
+    tried = Rollouts(lambda theta: evaluate(controller, theta, paper.STEPS).cost, start, budget)
+    tried.descend(SPREAD, seed + 1, least=0)
     lowest = np.minimum.accumulate(tried.costs)
     fell = np.flatnonzero(np.r_[True, lowest[1:] < lowest[:-1]])
     return SearchResult(
@@ -225,9 +204,3 @@ def search(wanted: Search) -> SearchResult:
         rollouts=tuple((fell + 1).tolist()),
         best=tuple(lowest[fell].tolist()),
     )
-
-
-def search_all(searches: Collection[Search]) -> dict[Search, SearchResult]:
-    """`search` for many, in parallel."""
-    found = dict(parallel(search, searches))
-    return {one: found[one] for one in searches}

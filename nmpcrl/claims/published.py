@@ -22,7 +22,7 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, THETA, cost_ratios, experiment_of, row
-from nmpcrl.analysis.search import Search, SearchResult
+from nmpcrl.analysis.search import SearchResult
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import assumptions
 from nmpcrl.claims.assumptions import Measurement
@@ -35,7 +35,7 @@ from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.provenance import EPOCHS, summary_key
+from nmpcrl.study.provenance import summary_key
 from nmpcrl.study.published import Damaged as Damaged
 from nmpcrl.study.published import folder as folder
 from nmpcrl.study.records import Column, Stopped
@@ -150,7 +150,7 @@ class Published(Evidence):
 
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     about: Mapping[str, Any] = field(default_factory=dict)  # the manifest's entry of the runs
-    searches: Mapping[Search, SearchResult] = field(default_factory=dict)
+    searches: Mapping[str, SearchResult] = field(default_factory=dict)  # by layout
     timed: Mapping[str, Any] = field(default_factory=dict)  # date, machine and so on of `timings`
 
     @property
@@ -162,10 +162,6 @@ class Published(Evidence):
     def parts(self) -> dict[str, int]:
         """The number of runs of each part of the study."""
         return {part: n for batch in self.batches for part, n in batch["runs"].items()}
-
-    def is_current(self, part: str) -> bool:
-        """Whether the runs of a part are of the present epochs."""
-        return store.epochs(self.about, part) == EPOCHS
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -199,9 +195,7 @@ def _load(place: Path) -> Published:
     }
     ratios = [*cost_ratios(rows).values()]
     searches = {
-        Search(one.layout, one.seed, one.budget): SearchResult(
-            tuple(one.theta), one.made, tuple(one.rollouts), tuple(one.best)
-        )
+        one.layout: SearchResult(tuple(one.theta), one.made, tuple(one.rollouts), tuple(one.best))
         for one in _table(SEARCHES, place).itertuples()
     }
     return Published(

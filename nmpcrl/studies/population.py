@@ -374,7 +374,7 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
 
 def raised() -> pd.Series:
     """The share by which the cost of the best theta rises with theta_c, by layout from A to F."""
-    best = {search.layout: np.array(one.theta) for search, one in six.load().searches.items()}
+    best = {layout: np.array(one.theta) for layout, one in six.load().searches.items()}
     return pd.Series({n: trap.raised_cost(n, best[n], CLIFF_RAISED) for n in sorted(best)})
 
 

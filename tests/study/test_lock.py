@@ -79,7 +79,7 @@ IMPORTS = """
 import sys
 from pathlib import Path
 import nmpcrl
-from nmpcrl.analysis.search import Search, search
+from nmpcrl.analysis.search import search
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.study.experiment import Experiment
@@ -87,7 +87,7 @@ from nmpcrl.study.run import run
 
 for learner in ("ES", "RDES", "GES"):
     row(summarise(run(Experiment(learner, episodes=1, steps=5, evaluate_every=1))))
-search(Search(budget=40))
+search("A", 40)
 for module in list(sys.modules.values()):
     if module.__name__.startswith("nmpcrl."):
         print(Path(module.__file__).relative_to(Path(nmpcrl.__file__).parent).as_posix())
