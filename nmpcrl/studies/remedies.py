@@ -20,7 +20,7 @@ The part `best` searches for J_best, which all other rows have as a column.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -179,41 +179,32 @@ def gain(by_layout: pd.Series) -> Estimate:
     return interquartile_mean(by_layout.to_numpy(), ["layouts"] * len(by_layout))
 
 
-class RemedyRow(NamedTuple):
-    """The result of an entry in one part."""
+def rows(runs: pd.DataFrame) -> pd.DataFrame:
+    """The result of each entry in each part of a table, in the order of the table.
 
-    part: str
-    entry: str
-    name: str  # with its settings
-    gain: Estimate
-    solved: Estimate  # share of the layouts
-    layouts: int
-    left_out: int  # layouts without a share
-    rollouts: int  # of a layout and seed at most, confirming ones and a tuner's included
-    seconds: float  # of processor time, mean of a layout and seed
-    disqualified: bool  # whether it began too many somewhere
-
-
-def rows(runs: pd.DataFrame) -> list[RemedyRow]:
-    """The result of each entry in each part of a table, in the order of the table."""
+    Columns part, entry, name (with its settings), gain (an `Estimate`), solved (the share of the
+    layouts, an `Estimate`), layouts, left_out (layouts without a share), rollouts (of a layout and
+    seed at most, confirming ones and a tuner's included), seconds (of processor time, mean of a
+    layout and seed) and disqualified (whether too many were begun somewhere).
+    """
     found = []
     for (part, entry), each in runs.groupby(["part", "entry"], sort=False):
         gained, well = shares(each), solved(each)
         found.append(
-            RemedyRow(
-                part=str(part),
-                entry=str(entry),
-                name=str(each.arm.iloc[0]),
-                gain=gain(gained),
-                solved=rate(int(well.sum()), len(well)),
-                layouts=len(well),
-                left_out=len(well) - len(gained),
-                rollouts=int(each.episodes.max()),
-                seconds=float(each.seconds.mean()),
-                disqualified=bool(each.over.any()),
-            )
+            {
+                "part": part,
+                "entry": entry,
+                "name": each.arm.iloc[0],
+                "gain": gain(gained),
+                "solved": rate(*count(well)),
+                "layouts": len(well),
+                "left_out": len(well) - len(gained),
+                "rollouts": int(each.episodes.max()),
+                "seconds": float(each.seconds.mean()),
+                "disqualified": bool(each.over.any()),
+            }
         )
-    return found
+    return pd.DataFrame(found)
 
 
 def _runs(table: pd.DataFrame, part: str, entry: str) -> pd.DataFrame:
@@ -237,11 +228,11 @@ EXPECTED_NEVER = ("DPG",)
 def advice(table: pd.DataFrame) -> pd.DataFrame:
     """The advice on each entry by `ADVICE`, the first to try first; a row an entry and part.
 
-    It has the fields of `RemedyRow`, the lower end `low` of the gain, the `word` of the advice, and
-    `tuning`, the rollouts that its tuning took.
+    Columns of `rows`, the lower end `low` of the gain, the `word` of the advice, and `tuning`, the
+    rollouts that its tuning took.
     """
-    judged = [row for part in ADVISED for row in rows(table[table.part == part])]
-    found = pd.DataFrame(judged, columns=RemedyRow._fields)
+    judged = (rows(table[table.part == part]) for part in ADVISED)
+    found = pd.concat(judged, ignore_index=True)
     found = found[~found.entry.isin([CONTROL, *found.entry[found.disqualified]])]
     low = found.gain.map(lambda one: one.low).astype(float)
     fails = [one.gain.high < 0 or one.solved.high < HALF for one in found.itertuples()]

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -138,14 +138,6 @@ def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
     return contradictions(here, there)
 
 
-class Proof(NamedTuple):
-    """The proof on which a new lock rests."""
-
-    lock: Path
-    published: int  # runs with the bits of published ones
-    stored: int  # runs with the bits of those that locked code stored here
-
-
 def sample(variants: Mapping[Experiment, str], count: int) -> tuple[Experiment, ...]:
     """Some of these runs, spread over the parts of the study and in each part over its learners."""
     parts: dict[str, dict[str, list[Experiment]]] = {}
@@ -162,15 +154,17 @@ def _interleaved(groups: Iterable[Iterable[Experiment]]) -> list[Experiment]:
     return [e for turn in zip_longest(*groups) for e in turn if e is not None]
 
 
-def relock(known: Published, count: int, *, workers: int | None = None) -> Proof:
+def relock(known: Published, count: int, *, workers: int | None = None) -> tuple[Path, int, int]:
     """Train `count` runs afresh, and write the lock if all have the bits that locked code made.
+
+    Returned are the lock, and how many runs have the bits of published and of stored ones.
 
     A fresh run is compared with the published run, if a machine like this one made it, else with
     the run that is stored here. In a raised epoch the lock is written without any training. A
     `Refusal` names a changed bit, or the number of runs without a comparison.
     """
     if lock.locked()["epochs"] != provenance.EPOCHS:
-        return Proof(lock.relock(), 0, 0)
+        return lock.relock(), 0, 0
     drawn = sample(known.variants, count)
     exact = comparable(drawn, known)
     before: dict[Experiment, Row] = {e: known.rows[e] for e in exact}
@@ -193,7 +187,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Proof
         )
     for experiment, one in fresh.items():  # the next edit is compared with these
         SUMMARIES.save(experiment, one)
-    return Proof(lock.relock(), len(exact), len(drawn) - len(exact))
+    return lock.relock(), len(exact), len(drawn) - len(exact)
 
 
 def _stored_by_lock(e: Experiment) -> RunSummary | None:

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.suite import Robot, followed, judge
-from nmpcrl.studies.agents import AGENTS, PARTS, SAC_AND_TD3, SETTINGS, tuned
-from nmpcrl.studies.agents_run import EVERY, SAC, TD3, curve, judged_in, seen, trained, trained_in
+from nmpcrl.studies import agents
+from nmpcrl.studies.agents import AGENTS, PARTS, SAC, SAC_AND_TD3, SETTINGS, TD3, curve, seen, tuned
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.refusal import Refusal
@@ -28,7 +28,7 @@ START = np.r_[paper.START, np.ravel(LAYOUT)]
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """One episode of random actions, and few gradient steps after each."""
-    monkeypatch.setattr("nmpcrl.studies.agents_run.RANDOM", 1)
+    monkeypatch.setattr("nmpcrl.studies.agents.RANDOM", 1)
 
 
 def quick(name):
@@ -36,7 +36,7 @@ def quick(name):
 
 
 def checkpoints_of(name, env, layouts, episodes, seed):
-    return trained(name, env, layouts, episodes, seed, **quick(name).settings)
+    return agents.trained(name, env, layouts, episodes, seed, **quick(name).settings)
 
 
 @needs_agents
@@ -128,6 +128,6 @@ def test_settings_are_the_published_tuning_s_and_one_agent_for_all_meets_new_lay
     table = SAC_AND_TD3.table()
     for part in PARTS:
         assert {*PARTS[part].settings(table)} == {*table[table.part == part].arm}
-    assert {*trained_in(EVERY)} == {*TUNE}
-    assert {*judged_in(EVERY)} == {*TUNE, *JUDGE}
-    assert {*judged_in("J001")} == {*trained_in("J001")} == {"J001"}
+    assert {*agents.trained_in(agents.EVERY)} == {*TUNE}
+    assert {*agents.judged_in(agents.EVERY)} == {*TUNE, *JUDGE}
+    assert {*agents.judged_in("J001")} == {*agents.trained_in("J001")} == {"J001"}

@@ -5,9 +5,9 @@ for each transition, with the outer product of Q's gradient for a Hessian, and n
 """
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from csnlp import Nlp
@@ -33,15 +33,11 @@ SOLVERS: dict[str, dict[str, Any]] = {
 }
 
 
-class Run(NamedTuple):
-    """An episode of the agent; a failed solve ends it."""
+def run(solver: str, seed: int, steps: int) -> tuple[Vector, Vector]:
+    """Costs and disturbances of an episode of `gros_zanon` in which mpcrl's agent learns.
 
-    costs: Vector  #: of each step
-    disturbances: Vector  #: e of each step
-
-
-def run(solver: str, seed: int, steps: int) -> Run:
-    """Train mpcrl's agent for an episode of `gros_zanon`, with one of `SOLVERS`."""
+    It has one of `SOLVERS`; a failed solve ends the episode.
+    """
     costs, disturbances = [], []
 
     def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Any, ...]:
@@ -52,8 +48,8 @@ def run(solver: str, seed: int, steps: int) -> Run:
 
     with silent(), suppress(MpcSolverError):
         there = world(gz.problem(), plant, gz.START, steps)
-        agent(gros_zanon_plan(solver), gz.problem()).train(there, episodes=1, seed=seed)
-    return Run(np.array(costs), np.array(disturbances))
+        agent(gz.problem(), gros_zanon, solver).train(there, episodes=1, seed=seed)
+    return np.array(costs), np.array(disturbances)
 
 
 def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> Any:
@@ -62,11 +58,24 @@ def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> A
     return TransformReward(env, lambda reward: -float(reward))
 
 
-def agent(controller: Mpc, problem: Problem) -> LstdQLearningAgent:
-    """Q-learning after each transition, of a plan in csnlp; `problem` has its theta and gamma."""
-    learnable = [LearnableParameter(name, one.shape, one) for name, one in starts(problem).items()]
+def agent(
+    problem: Problem, plan: Callable[[Mpc, dict[str, Any]], Any], solver: str
+) -> LstdQLearningAgent:
+    """Q-learning after each transition, with one of `SOLVERS`.
+
+    `plan` adds variables and constraints to an empty `Mpc`, and returns its objective; its second
+    argument has the parameters of `problem` by name.
+    """
+    starts = {name: np.asarray(one, float) for name, one in problem.split(problem.theta).items()}
+    shapes = {name: one.shape if one.ndim == 2 else (one.size, 1) for name, one in starts.items()}
+    mpc = Mpc(Nlp("SX"), problem.horizon)
+    theta = {name: mpc.parameter(name, shape) for name, shape in shapes.items()}
+    mpc.minimize(plan(mpc, theta))
+    common = {"expand": True, "print_time": False, "bound_consistency": True, "calc_lam_p": False}
+    mpc.init_solver(common | SOLVERS[solver], solver=next(iter(SOLVERS[solver])), type="nlp")
+    learnable = [LearnableParameter(name, one.shape, one) for name, one in starts.items()]
     return LstdQLearningAgent(
-        mpc=controller,
+        mpc=mpc,
         learnable_parameters=LearnableParametersDict(learnable),
         discount_factor=problem.gamma,
         update_strategy=1,
@@ -76,14 +85,8 @@ def agent(controller: Mpc, problem: Problem) -> LstdQLearningAgent:
     )
 
 
-def starts(problem: Problem) -> dict[str, Any]:
-    """The first theta, by name, each parameter an array."""
-    return {name: np.asarray(one, float) for name, one in problem.split(problem.theta).items()}
-
-
-def gros_zanon_plan(solver: str) -> Mpc:
-    """The plan of `gros_zanon` by multiple shooting, with one of `SOLVERS`."""
-    plan, th = begin(gz.problem())
+def gros_zanon(plan: Mpc, th: dict[str, Any]) -> Any:
+    """The plan of `gros_zanon` by multiple shooting, for `agent`."""
     x, _ = plan.state("x", 2, bound_initial=False)
     u, _ = plan.action("u", 1, lb=-1, ub=1)
     slack, _, _ = plan.variable("s", (2, gz.HORIZON), lb=0)
@@ -95,24 +98,7 @@ def gros_zanon_plan(solver: str) -> Mpc:
         z, v, s = x[:, i], u[:, i], slack[:, i]
         stage = 0.5 * (z.T @ z + 0.5 * v**2 + gz.PENALTY * (s[0] + s[1]))
         objective += gz.GAMMA**i * stage + th["f"][:2].T @ z + th["f"][2] * v
-    return end(plan, objective, solver)
-
-
-def begin(problem: Problem) -> tuple[Mpc, dict[str, Any]]:
-    """An empty plan, and theta as its parameters by name."""
-    plan = Mpc(Nlp("SX"), problem.horizon)
-    return plan, {
-        name: plan.parameter(name, one.shape if one.ndim == 2 else (one.size, 1))
-        for name, one in starts(problem).items()
-    }
-
-
-def end(plan: Mpc, objective: Any, solver: str) -> Mpc:
-    """The plan with its objective and its solver."""
-    plan.minimize(objective)
-    common = {"expand": True, "print_time": False, "bound_consistency": True, "calc_lam_p": False}
-    plan.init_solver(common | SOLVERS[solver], solver=next(iter(SOLVERS[solver])), type="nlp")
-    return plan
+    return objective
 
 
 @contextmanager

@@ -16,14 +16,15 @@ PROBLEM = gz.problem()
 @pytest.fixture(scope="module")
 def agent():
     with peers.silent():
-        return peers.agent(peers.gros_zanon_plan("ipopt, exact"), PROBLEM)
+        return peers.agent(PROBLEM, peers.gros_zanon, "ipopt, exact")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["V", "Q"])
 def test_values_and_their_gradients_are_csnlps(agent, kind):
     """V and Q to 1e-6, and the gradient wherever no kink is near."""
-    ours, names = Nmpc(PROBLEM, solver=Riccati(1e-10)), peers.starts(PROBLEM)
+    ours = Nmpc(PROBLEM, solver=Riccati(1e-10))
+    names = {name: np.asarray(one) for name, one in PROBLEM.split(PROBLEM.theta).items()}
     nlp = getattr(agent, kind).nlp
     in_order = ca.vvcat([nlp.parameters[name] for name in names])
     slope = NlpSensitivity(nlp, in_order).jacobian("L-p")

@@ -46,10 +46,8 @@ def test_values_and_slopes_are_riccatis_and_the_worth_of_a_gain_is_what_it_costs
     assert lqr.worth(np.array([[9.0, 9.0]])).cost == np.inf
 
 
-@pytest.fixture
-def agent():
-    """mpcrl's agent with a plan of `lqr` by multiple shooting in csnlp."""
-    plan, th = peers.begin(lqr.problem())
+def shooting(plan, th):
+    """A plan of `lqr` by multiple shooting in csnlp."""
     x, _ = plan.state("x", 2, bound_initial=False)
     u, _ = plan.action("u", 1)
     plan.set_affine_dynamics(th["A"], th["B"])
@@ -57,10 +55,11 @@ def agent():
     for i in range(gz.HORIZON):
         stage = x[:, i].T @ th["Q"] @ x[:, i] + u[:, i].T @ th["R"] @ u[:, i]
         objective += gz.GAMMA**i * stage
-    return peers.agent(peers.end(plan, objective, "ipopt, 1e-10"), lqr.problem())
+    return objective
 
 
-def test_value_and_action_are_csnlps_and_the_agent_of_the_peer_meets_our_plant(agent):
+def test_value_and_action_are_csnlps_and_the_agent_of_the_peer_meets_our_plant():
+    agent = peers.agent(lqr.problem(), shooting, "ipopt, 1e-10")
     for state in np.random.default_rng(3).normal(size=(5, 2)):
         solution = NMPC.solve(state, lqr.problem().theta)
         with peers.silent():
