@@ -7,9 +7,9 @@ that work with what Maei et al. (2009) prove for smooth values. So C8 asks about
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.claims.rule import Claim, Observations
 from nmpcrl.claims.thresholds import TEXTS
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE, Assumption, Verdict
@@ -41,8 +41,8 @@ class Measurement:
     dropped: float  # size of the curvature term beside the printed direction, median
 
 
-def measured(experiment: Experiment, records: Records, curvature: Curvature) -> Measurement:
-    """The numbers of one run of GES."""
+def measured(experiment: Experiment, records: Records, curvature: pd.DataFrame) -> Measurement:
+    """The numbers of one run of GES, whose `dropped_curvature` is given."""
     kinks, delta = metrics.boundary_share(records, experiment.task), records.steps["delta"]
     delta = delta[np.isfinite(delta)]
     memory = float(np.corrcoef(delta[:-1], delta[1:])[0, 1])

@@ -20,11 +20,13 @@ from nmpcrl.study.experiment import PAPER
 WORDS = {REPRODUCED: "confirmed", PARTLY: "confirmed in part", NOT: "not confirmed"}
 
 
-def compared(
+def _compared(
+    name: str,
+    threshold: float,
     learners: tuple[str, str],
     size: Callable[[pd.Series], pd.Series] = lambda difference: difference,
-) -> dict[str, Any]:
-    """The fields of a claim that compares the final noise-free costs of two learners.
+) -> RunClaim:
+    """A claim that compares the final noise-free costs of two learners.
 
     The numbers are `size` of the cost of the first minus the second's, in shares of theta_init's,
     in the cells of our own learner.
@@ -36,14 +38,16 @@ def compared(
         difference = size(cost_difference(*arms(runs, first, second, among=ours)))
         return difference.astype(float).to_frame(f"{first} and {second}")
 
-    return {
-        "learners": learners,
-        "measured": "final noise-free costs, in shares of theta_init's",
-        "values": values,
-        "numbers": _numbers,
-        "label": f"noise-free cost, {first} - {second}",
-        "words": WORDS,
-    }
+    return AtMost(
+        **texts(name),
+        threshold=threshold,
+        learners=learners,
+        measured="final noise-free costs, in shares of theta_init's",
+        values=values,
+        numbers=_numbers,
+        label=f"noise-free cost, {first} - {second}",
+        words=WORDS,
+    )
 
 
 def _numbers(runs: pd.DataFrame, _: Paths, learners: tuple[str, ...]) -> dict[str, Any]:
@@ -78,26 +82,10 @@ def _pairs(runs: pd.DataFrame, first: str, second: str) -> tuple[pd.DataFrame, p
     return one[known], other[known]
 
 
-_CLAIMS: tuple[RunClaim, ...] = (
-    AtMost(
-        **texts("B1"),
-        threshold=SAME_COST,
-        **compared(("TDC", "GES")),
-    ),
-    AtMost(
-        **texts("B2"),
-        threshold=-BETTER,
-        **compared(("ES", "random")),
-    ),
-    AtMost(
-        **texts("B3"),
-        threshold=SAME_COST,
-        **compared(("matched", "GES"), pd.Series.abs),
-    ),
-    AtMost(
-        **texts("B4"),
-        threshold=SAME_COST,
-        **compared(("QL", "ES")),
-    ),
+_CLAIMS = (
+    _compared("B1", SAME_COST, ("TDC", "GES")),
+    _compared("B2", -BETTER, ("ES", "random")),
+    _compared("B3", SAME_COST, ("matched", "GES"), pd.Series.abs),
+    _compared("B4", SAME_COST, ("QL", "ES")),
 )
 OWN_CLAIMS = {claim.name: claim for claim in _CLAIMS}

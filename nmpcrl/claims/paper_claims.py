@@ -146,20 +146,8 @@ _CLAIMS: tuple[Claim, ...] = (
         numbers=partial(_contrasted, thresholds.instability, "late_cost_range"),
         borders=np.geomspace(0.005, 1.5, UP_TO),
     ),
-    TimeClaim(
-        **texts("C3"),
-        learner="RDES",
-        claimed=HALF,
-        near=NEAR_HALF,
-        **TIMED,
-    ),
-    TimeClaim(
-        **texts("C4"),
-        learner="GES",
-        claimed=SAME_TIME,
-        near=NEAR_SAME_TIME,
-        **TIMED,
-    ),
+    TimeClaim(**texts("C3"), learner="RDES", claimed=HALF, near=NEAR_HALF, **TIMED),
+    TimeClaim(**texts("C4"), learner="GES", claimed=SAME_TIME, near=NEAR_SAME_TIME, **TIMED),
     AtMost(
         **texts("C5"),
         learners=("RDES", "GES"),

@@ -6,6 +6,9 @@ seeds in layout A, had been seen by then.  # departure P
 
 A run that got stuck, hit an obstacle, failed or left the box answers like any other. Its cost is
 infinite where a solve failed or training was stopped.
+
+The manifest of the published data names the commit that fixed them; a test compares `NUMBERS` with
+every later state of the code. `decided_since.csv` lists the definitions that came later.
 """
 
 import tomllib
@@ -18,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis import metrics
+from nmpcrl.claims import rule
 from nmpcrl.claims.rule import CELL
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records, Stopped
@@ -45,6 +49,14 @@ BETTER = 0.01
 NEAR_HALF = (0.0, 1.0)
 NEAR_SAME_TIME = (0.8, 1.25)
 
+_PLACES = {  # of each number that was fixed: here, in the rule for shares, and in the metrics
+    "DIVERGED UNSTABLE HALF SAME_TIME SAME_PATH SAME_COST MORE_ACCURATE BETTER"
+    " NEAR_HALF NEAR_SAME_TIME": globals(),
+    "MAJORITY NEARLY_ALL NEARLY_NONE": vars(rule),
+    "TOUCH": vars(metrics),
+}
+NUMBERS = {name: place[name] for names, place in _PLACES.items() for name in names.split()}
+
 TEXTS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 
 
@@ -56,6 +68,21 @@ def texts(claim: str) -> dict[str, Any]:
     }
     border = found.get("border", "").format_map({**globals(), "TOUCH": metrics.TOUCH})
     return found | {"name": claim} | ({"border": border} if border else {})
+
+
+def fixed(about: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Hash and date (UTC) of two commits: "thresholds" fixed, and first runs "published".
+
+    `about` is a field of `published.load()`. Empty if the manifest has other numbers than the code.
+    """
+    known = {**about.get("fixed", {})}
+    today = {name: list(one) if isinstance(one, tuple) else one for name, one in NUMBERS.items()}
+    return known if known.pop("numbers", {}) == today else {}
+
+
+def decided_since() -> pd.DataFrame:
+    """The definitions that came after the thresholds, in order: commit, date, when, what, moved."""
+    return pd.read_csv(Path(__file__).with_name("decided_since.csv"), dtype=str)
 
 
 def was_stopped(runs: pd.DataFrame) -> pd.Series:

@@ -12,7 +12,6 @@ from builders import START_COST, quiet_row, timings
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import experiment_of, table
 from nmpcrl.analysis.summary import summarise
@@ -368,7 +367,7 @@ def test_the_audit_measures_kinks_memory_and_the_dropped_term(on_boundary):
         "theta": np.tile(paper.THETA_INIT, (4, 1)),
         "delta": np.array([1.0, 2.0, 3.0, 4.0]),
     }
-    records, size = Records({"theta": paper.THETA_INIT}, steps, {}, {}), np.array([2.0])
-    found = measured(Experiment("GES"), records, Curvature(size, size, size / 4))
+    records = Records({"theta": paper.THETA_INIT}, steps, {}, {})
+    found = measured(Experiment("GES"), records, pd.DataFrame({"ratio": [0.25]}))
     assert (found.kinks, found.dropped) == (on_boundary, 0.25)
     assert found.memory == pytest.approx(1)

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 
 from history import git
 
-from nmpcrl.claims import prespecified, published
-from nmpcrl.claims.prespecified import NUMBERS, decided_since, fixed
+from nmpcrl.claims import published
+from nmpcrl.claims.thresholds import NUMBERS, decided_since, fixed
 from nmpcrl.study import published as store
 
 ASSIGNED = f"^({'|'.join(NUMBERS)}) = "
@@ -48,5 +48,5 @@ def test_each_later_decision_is_a_commit_of_that_date_and_other_numbers_have_non
     assert later.date.tolist() == [*map(date, later.commit)]
     about = published.load().about
     assert fixed({}) == {}
-    monkeypatch.setitem(prespecified.NUMBERS, "DIVERGED", 1.4)
+    monkeypatch.setitem(NUMBERS, "DIVERGED", 1.4)
     assert fixed(about) == {}
