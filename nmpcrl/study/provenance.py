@@ -5,8 +5,8 @@ A new field, layout or metric changes no key, nor does code, whose changes `lock
 
 import hashlib
 import json
-import math
 import platform
+from dataclasses import fields
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -25,37 +25,10 @@ RUN_ROOMS = ("control", "learning", "study")  # whose code bears on a run; all, 
 
 LIBRARIES = ("casadi", "numba", "numpy")  # of every run; also torch, where a network learns
 
-# A field is left out of the key where it has this value, which it had when it became a field. New
-# fields are added with the value that all runs before them had; an entry never changes, even if the
-# default of the field does.
-ORIGINAL: dict[str, Any] = {
-    "learner": "ES",
-    "seed": 0,
-    "episodes": 300,
-    "obstacles": ((0.5, 2.2), (3.0, 0.5), (5.5, 2.8), (7.0, 0.3)),
-    "decay": "step",
-    "decay_rate": 0.99,
-    "alpha": 1e-7,
-    "beta": 1e-8,
-    "zeta": 1e-2,
-    "gated": True,
-    "clipped": True,
-    "constrained": False,
-    "network": "plain",
-    "box": "hard",
-    "ties_active": False,
-    "curvature": True,
-    "projected": True,
-    "beta_tdc": 1.5e-7,
-    "theta": (1.0, 1.0, 0.05, 0.05, 0.05, 1.0, 1.0, 0.1, 0.001),
-    "steps": 130,
-    "start": (-2.5, 1.5, 0.0),
-    "target": (8.5, 2.0, math.pi / 2),
-    "horizon": 10,
-    "solver": "riccati",
-    "tolerance": 1e-8,
-    "evaluate_every": 10,
-}
+# A field is left out of the key where it has this value, which all runs had before it was a field:
+# its default. If a default changes, its first value is written here, so that no key changes.
+ORIGINAL: dict[str, Any] = {one.name: one.default for one in fields(Experiment)}
+ORIGINAL["obstacles"] = paper.LAYOUTS[ORIGINAL.pop("layout")]
 
 
 def key(experiment: Experiment | Trial) -> str:
@@ -76,9 +49,9 @@ def identity(experiment: Experiment | Trial) -> dict[str, Any]:
     """
     if isinstance(experiment, Trial):
         return experiment.identity
-    fields = dict(vars(experiment.canonical))
-    fields = {"obstacles": paper.centres_of(fields.pop("layout"))} | fields
-    return {name: value for name, value in fields.items() if value != ORIGINAL[name]}
+    named = dict(vars(experiment.canonical))
+    named = {"obstacles": paper.centres_of(named.pop("layout"))} | named
+    return {name: value for name, value in named.items() if value != ORIGINAL[name]}
 
 
 def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:
