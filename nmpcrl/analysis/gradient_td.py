@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import metrics
@@ -57,22 +58,12 @@ def directions(records: Records) -> Directions:
     return Directions(*(column[known] for column in columns))
 
 
-@dataclass(frozen=True, eq=False)
-class Curvature:
-    """Lengths of the printed direction and of the dropped term at sampled steps of one run."""
+def dropped_curvature(records: Records, *, samples: int = 200) -> pd.DataFrame:
+    """The dropped term h of a run of GES, at steps spread evenly over training, one row each.
 
-    episode: Vector
-    direction: Vector  # ||delta phi - gamma (w'phi) phi+||
-    dropped: Vector  # ||h||
-
-    @property
-    def ratio(self) -> Vector:
-        """Length of the dropped term over the length of the printed direction."""
-        return self.dropped / self.direction
-
-
-def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
-    """The dropped term h of a run of GES, at steps spread evenly over training."""
+    Columns episode, direction (||delta phi - gamma (w'phi) phi+||), dropped (||h||) and ratio, of
+    the dropped term to the printed direction.
+    """
     steps, gamma = records.steps, paper.GAMMA
     nmpc = controller_of(Experiment(**records.experiment))
     known = np.flatnonzero(np.isfinite(steps["delta"]))[1:]
@@ -90,5 +81,5 @@ def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
         direction = delta * phi - gamma * (w @ phi) * after.features
         dropped = (delta - phi @ w) * hessian @ w
         rows.append((steps["episode"][k], np.linalg.norm(direction), np.linalg.norm(dropped)))
-    episode, direction, dropped = np.array(rows).T
-    return Curvature(episode, direction, dropped)
+    found = pd.DataFrame(rows, columns=["episode", "direction", "dropped"])
+    return found.assign(ratio=found.dropped / found.direction)

@@ -30,11 +30,6 @@ def training_cost(records: Records) -> Vector:
     return np.where(count == length, total, np.nan)
 
 
-def noise_free_cost(records: Records) -> tuple[Column, Vector]:
-    """The episodes before each rollout without noise, and the rollout's cost."""
-    return records.evaluations["episode"], records.evaluations["cost"]
-
-
 def initial_cost(run: Run) -> float:
     """Noise-free cost of theta_init."""
     return float(run.evaluations["cost"][0])
@@ -60,11 +55,6 @@ def late_cost_range(run: Run) -> float:
 def final_theta(records: Records) -> Column:
     """theta when training stopped, shape (d,)."""
     return np.asarray(records.steps["theta"][-1])
-
-
-def final_rollout(records: Records) -> tuple[Column, Column]:
-    """States (K + 1, n) and actions (K + 1, m) of the last rollout without noise."""
-    return records.evaluations["states"][-1], records.evaluations["actions"][-1]
 
 
 def late_training_cost(cost: Vector) -> float:

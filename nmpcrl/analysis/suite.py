@@ -384,33 +384,24 @@ def judge_all(
     )
 
 
-def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
-    """One row for each entry of `judge_all`.
+def scores(judged: pd.DataFrame) -> dict[str, Any]:
+    """The scores of one entry in the rows of `judge_all`.
 
-    Columns entry, places (how many), solved and clear (of moving obstacles; shares of the places),
-    gain (interquartile mean over places), episodes (most in a place), seconds, and over (the first
-    place in which the budget was exceeded, or ""). Intervals are over places.
+    places (how many), solved and clear (of moving obstacles; shares of the places), gain
+    (interquartile mean over places), episodes (most in a place), seconds, and over (the first place
+    in which the budget was exceeded, or ""). Intervals are over places.
     """
-    rows = []
-    for name, runs in judged.groupby("entry", sort=False):
-        places = [each for _, each in runs.groupby("place", sort=False)]
-        gains = np.array([np.mean(gain(each).to_numpy()) for each in places])  # over seeds
-        well = sum(bool(solved(each).all()) for each in places)
-        clear = sum(not each.inside.any() for each in places)  # of moving obstacles
-        beyond = [*runs.place[runs.over.astype(bool)], ""]  # where the budget was exceeded
-        rows.append(
-            {
-                "entry": name,
-                "places": len(places),
-                "solved": rate(well, len(places)),
-                "gain": interquartile_mean(gains, ["places"] * len(places)),
-                "episodes": int(runs.episodes.max()),
-                "seconds": sum(runs.seconds),
-                "clear": rate(clear, len(places)),
-                "over": beyond[0],
-            }
-        )
-    return pd.DataFrame(rows)
+    places = [each for _, each in judged.groupby("place", sort=False)]
+    gains = np.array([np.mean(gain(each).to_numpy()) for each in places])  # over seeds
+    return {
+        "places": len(places),
+        "solved": rate(sum(bool(solved(each).all()) for each in places), len(places)),
+        "gain": interquartile_mean(gains, ["places"] * len(places)),
+        "episodes": int(judged.episodes.max()),
+        "seconds": sum(judged.seconds),
+        "clear": rate(sum(not each.inside.any() for each in places), len(places)),
+        "over": next(iter(judged.place[judged.over.astype(bool)]), ""),
+    }
 
 
 def followed(robot: Robot, policy: Policy) -> Rollout:

@@ -161,6 +161,5 @@ def summarise(records: Records) -> RunSummary:
     }
     run = _Steps(records, nmpc)
     episodes = {name: column(run) for name, column in EPISODES.items()}
-    return RunSummary(
-        records.experiment, episodes, evaluations, *metrics.final_rollout(records), facts
-    )
+    states, actions = (evaluated[name][-1] for name in ("states", "actions"))
+    return RunSummary(records.experiment, episodes, evaluations, states, actions, facts)

@@ -30,7 +30,7 @@ def suite(policy: str | None, moving: bool, workers: int | None, listed: bool,
     """
     import pandas as pd
 
-    from nmpcrl.analysis.suite import ENTRIES, judge_all, leaderboard
+    from nmpcrl.analysis.suite import ENTRIES, judge_all, scores
 
     if listed:
         click.echo("\n".join(ENTRIES))
@@ -38,16 +38,16 @@ def suite(policy: str | None, moving: bool, workers: int | None, listed: bool,
     if policy is None:
         raise click.ClickException("--policy names an entry: MODULE:FACTORY, or a shipped one")
     judged = judge_all(policy, moving=moving, workers=workers, **asked)  # type: ignore[arg-type]
-    (row,) = leaderboard(judged).itertuples()
+    found = scores(judged)
+    if found["over"]:
+        said = f"it began more than {asked['budget']} episodes in {found['over']}"
+        raise click.ClickException(f"{policy} is disqualified: {said}")
     cells = {
-        "entry": row.entry,
-        "scenarios" if moving else "layouts": row.places,
-        "solved": "disqualified" if row.over else f"{row.solved:.0%}",
-        "gain": "disqualified" if row.over else f"{row.gain:.1%}",
-        "episodes": row.episodes,
-        "CPU time": f"{row.seconds:.0f} s",
-    } | ({"never inside": f"{row.clear:.0%}"} if moving else {})
+        "entry": policy,
+        "scenarios" if moving else "layouts": found["places"],
+        "solved": f"{found['solved']:.0%}",
+        "gain": f"{found['gain']:.1%}",
+        "episodes": found["episodes"],
+        "CPU time": f"{found['seconds']:.0f} s",
+    } | ({"never inside": f"{found['clear']:.0%}"} if moving else {})
     click.echo(pd.DataFrame([cells]).to_string(index=False))
-    if row.over:
-        said = f"it began more than {asked['budget']} episodes in {row.over}"
-        raise click.ClickException(f"{row.entry} is disqualified: {said}")

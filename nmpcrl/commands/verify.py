@@ -26,12 +26,12 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
     known = published.load()
     whole(0, len(known.rows)).check("sample", sample)
     if relock:
-        done = reproduce.relock(known, sample or RELOCKED, workers=workers)
-        said = f"{done.published + done.stored} runs trained again gave the same bits"
-        said = f"{said}, {done.published} as published, {done.stored} as stored"
-        if not done.published + done.stored:
+        lock, there, here = reproduce.relock(known, sample or RELOCKED, workers=workers)
+        said = f"{there + here} runs trained again gave the same bits"
+        said = f"{said}, {there} as published, {here} as stored"
+        if not there + here:
             said = "an epoch was raised, so that no run is comparable with earlier ones"
-        click.echo(f"{said}: {done.lock}")
+        click.echo(f"{said}: {lock}")
         return
     wanted = {e for e in known.rows if summaries.SUMMARIES.path_of(e).exists()}
     if sample:

@@ -102,7 +102,8 @@ def named_table(table: pd.DataFrame, part: str) -> pd.DataFrame:
     """
     found = table[table.part == part]
     shown = {}
-    for row in sorted(rows(found), key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds)):
+    every = rows(found).itertuples()
+    for row in sorted(every, key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds)):
         runs = found[found.entry == row.entry]
         ended = solved(runs)
         each = shares(runs).reindex(ended.index).map("{:.2f}".format).replace("-inf", "fails")

@@ -9,7 +9,7 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.analysis.statistics import interquartile_mean
-from nmpcrl.analysis.suite import leaderboard
+from nmpcrl.analysis.suite import scores
 from nmpcrl.report.cited import Count
 from nmpcrl.studies import worlds
 from nmpcrl.studies.worlds import FAULTS
@@ -62,15 +62,15 @@ def moving(table: pd.DataFrame) -> pd.DataFrame:
     for view, policy in product(SEES, POLICIES):
         arm, initial = f"{view} {policy}", costs[f"{view} init"]
         judged = there[there.arm == arm]
-        judged = judged.assign(entry=arm, initial=judged.place.map(initial), episodes=0, over=False)
-        (row,) = leaderboard(judged).itertuples()
+        judged = judged.assign(initial=judged.place.map(initial), episodes=0, over=False)
+        row = scores(judged)
         ratio = (costs[arm] / costs["known init"]).dropna()
         found[view, policy] = {
             "cost": interquartile_mean(ratio.to_numpy(), ["all"] * len(ratio)),
-            "saved": row.gain,
-            "solved": row.solved,
+            "saved": row["gain"],
+            "solved": row["solved"],
             "inside": Count(int((met[arm] > 0.5).sum()), len(met)),
-            "clear": row.clear,
+            "clear": row["clear"],
         }
     return pd.DataFrame.from_dict(found, "index")
 

@@ -23,7 +23,6 @@ from nmpcrl.claims import (
     finding,
     own_claims,
     paper_claims,
-    prespecified,
     published,
     robustness,
     rule,
@@ -123,7 +122,7 @@ def middle_of_each_learner() -> Any:
 
 
 def shares_of_the_possible() -> Any:
-    gains = {search.layout: found.gain for search, found in study().searches.items()}
+    gains = {layout: found.gain for layout, found in study().searches.items()}
     return table(thresholds.share_of_possible(study().main.runs, gains))
 
 
@@ -215,7 +214,7 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
     "verdicts": {
         "as published": verdicts,
         "thresholds and rule": lambda: {
-            "numbers": prespecified.NUMBERS, "fixed": prespecified.fixed(study().about),
+            "numbers": thresholds.NUMBERS, "fixed": thresholds.fixed(study().about),
         },
         "other borders": other_borders,
         "distances of policies": lambda: table(
@@ -243,10 +242,10 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
         "middle of each learner": middle_of_each_learner,
         "shares of the possible": shares_of_the_possible,
         "searches": lambda: {
-            f"{one.layout} {one.seed} {one.budget}": {
+            f"{layout} 0 2000": {
                 "after 200": found.after(200), "made": found.made, "theta": found.theta,
             }
-            for one, found in study().searches.items()
+            for layout, found in study().searches.items()
         },
         "ratios of times": lambda: {
             f"{learner}, {solver}": ratio(study().timings, solver, learner)
@@ -275,7 +274,7 @@ FILES: dict[str, dict[str, Callable[[], Any]]] = {  # by file, its entries by na
     "remedies": {
         "answers on remedies": lambda: remedies.REMEDIES.answers(suite()),
         "advice": advice,
-        "rows": lambda: remedies.rows(suite()[suite().part != "best"]),
+        "rows": lambda: remedies.rows(suite()[suite().part != "best"]).to_dict("records"),
         "shares": lambda: {
             plain_name(name): table(remedies.shares(runs))
             for name, runs in suite().groupby(["part", "entry"], sort=False)

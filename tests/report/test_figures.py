@@ -15,7 +15,7 @@ from matplotlib.colors import to_hex
 
 from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.analysis.extrapolation import Outcome
-from nmpcrl.analysis.gradient_td import Curvature, dropped_curvature
+from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.suite import Judgement
 from nmpcrl.analysis.trap import Stand
@@ -122,7 +122,7 @@ def predicted() -> object:
 
 JUDGED = [Judgement(100.0, cost, cost < 100, 5, 0.1) for cost in (95.0, 150.0)]
 LAYOUTS = dict.fromkeys("ABCDEF", 0.3)
-MANY = Curvature(np.arange(9), np.ones(9), np.full(9, 0.01))
+MANY = pd.DataFrame({"episode": range(9), "ratio": 0.01})
 RUN = Experiment(**SMALL)
 FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is called
     plans.closed_loop: lambda draw: draw(paper.task("A"), *loop()),

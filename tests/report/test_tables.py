@@ -17,7 +17,7 @@ from nmpcrl.studies.agents import SAC_AND_TD3, course
 from nmpcrl.studies.difficulty import OPEN
 from nmpcrl.studies.investigation import Answer
 from nmpcrl.studies.population import Drawn, shares
-from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, REMEDIES, RemedyRow
+from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, REMEDIES
 from nmpcrl.studies.worlds import ORACLES, VIEWS
 from nmpcrl.study import paper
 from nmpcrl.study.design import VARIANTS
@@ -150,8 +150,9 @@ def test_an_answer_comes_with_its_question_its_evidence_and_what_was_expected(an
 
 def advised(entry, word, part=SHORT, gain=(0.8, 0.7, 0.9), share=0.9, setting=""):
     solved = Estimate(share, 0.8, 0.95)
-    made = RemedyRow(part, entry, entry + setting, Estimate(*gain), solved, 120, 2, 49, 0.54, False)
-    return made._asdict() | {"word": word, "tuning": 3000}
+    found = {"part": part, "entry": entry, "name": entry + setting, "gain": Estimate(*gain)}
+    found |= {"solved": solved, "layouts": 120, "left_out": 2, "rollouts": 49, "seconds": 0.54}
+    return found | {"word": word, "tuning": 3000}
 
 
 ADVICE = pd.DataFrame(

@@ -56,7 +56,7 @@ def test_what_is_gained_and_what_is_solved(runs, share, well):
     found = table(*runs)
     assert remedies.shares(found).tolist() == pytest.approx(share)
     assert remedies.solved(found).tolist() == well
-    (one,) = remedies.rows(found)
+    (one,) = remedies.rows(found).itertuples()
     assert (one.layouts, one.left_out, one.rollouts) == (len(well), len(well) - len(share), 50)
 
 

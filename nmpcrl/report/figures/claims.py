@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
-from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, rule, thresholds
@@ -153,7 +152,7 @@ def violations(found: Evidence, verdict: Verdict) -> Drawn:
 
 @page
 def theorem(
-    assumptions: Iterable[Assumption], verdict: Verdict, records: Records, curvature: Curvature
+    assumptions: Iterable[Assumption], verdict: Verdict, records: Records, curvature: pd.DataFrame
 ) -> Drawn:
     """C8: how dependent the transitions of a run of GES are, and how large the dropped term is."""
     figure, (lags, dropped) = subplots(2, 1, 4.8)

@@ -95,7 +95,8 @@ def two_costs(runs: Runs[Records]) -> Drawn:
         for experiment, records in runs.select(decay=decay).items():
             look = LOOKS[experiment.learner].line
             each_episode(column[0], metrics.training_cost(records), lw=1.2, **look)
-            column[1].plot(*metrics.noise_free_cost(records), **look)
+            judged = records.evaluations
+            column[1].plot(judged["episode"], judged["cost"], **look)
         over_episodes(column[0], decay, "")
         over_episodes(column[1], "", "episodes trained")
     grid[0, 0].set_ylabel("with noise [cost]")

@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.analysis.gradient_td import Curvature, directions
+from nmpcrl.analysis.gradient_td import directions
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
 from nmpcrl.learning.learners import gradient_td, semi_gradient
@@ -72,7 +73,7 @@ def corrections(runs: Runs[Records]) -> Drawn:
 
 
 @page
-def curvatures(measured: tuple[Curvature, ...]) -> Drawn:
+def curvatures(measured: tuple[pd.DataFrame, ...]) -> Drawn:
     """Size of the dropped term beside the printed direction, at sampled steps of GES."""
     figure, axes = subplots(height=2.6)
     for run in measured:

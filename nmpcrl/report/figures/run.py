@@ -49,7 +49,7 @@ def run_page(records: Records, frozen: Records | None = None) -> Drawn:
         learner = one.experiment["learner"]
         look = LOOKS[learner].line | {"label": learner}
         each_episode(panels["noisy"], metrics.training_cost(one), **look)
-        episode, judged = metrics.noise_free_cost(one)
+        episode, judged = one.evaluations["episode"], one.evaluations["cost"]
         known = np.isfinite(judged)
         panels["noise-free"].plot(episode[known], judged[known], marker=".", **look)
     panels["noisy"].legend(fontsize="small")
