@@ -69,24 +69,12 @@ def paper_runs(
 
 
 PERTURBATION = 1e-12  # added to theta_x at the start
-SOLVER_EPISODES = 20  # of a run with the other solver, which takes a minute
 
 
 def perturbed(experiment: Experiment) -> Experiment:
     """The replica of a run: theta_x of theta_init is moved by `PERTURBATION`."""
     first, *rest = experiment.theta
     return replace(experiment, theta=(first + PERTURBATION, *rest))
-
-
-def perturbed_pairs(**fields: Any) -> tuple[tuple[Experiment, Experiment], ...]:
-    """Every learner's run and its perturbed replica; `fields` as `paper_runs` takes them."""
-    return tuple((e, perturbed(e)) for e in paper_runs(**fields) if e.learner != "frozen")
-
-
-def solver_pair(experiment: Experiment) -> tuple[Experiment, Experiment]:
-    """The same short run with the default solver and with the paper's."""
-    short = replace(experiment, episodes=min(experiment.episodes, SOLVER_EPISODES))
-    return short, replace(short, solver="ipopt")
 
 
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too

@@ -1,14 +1,12 @@
 """Sets of runs: sweeps, replicas, and the study with what each run is compared with."""
 
-from collections import Counter
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from nmpcrl.study import Experiment, ParameterError, design, sweep
-from nmpcrl.study.experiment import MAIN, PAPER, frozen_arm
-from nmpcrl.study.learners import DECAYS
+from nmpcrl.study.experiment import MAIN, frozen_arm
 
 TABLE = set(design.main_table())
 STUDY = design.whole_study()
@@ -58,15 +56,6 @@ def test_a_replica_differs_in_the_twelfth_digit_of_theta_x():
     moved = np.array(replica.theta) - experiment.theta
     assert moved.tolist() == [pytest.approx(design.PERTURBATION, rel=1e-3), *[0] * 8]
     assert differing(experiment, replica) == {"theta"}
-    found = design.perturbed_pairs(episodes=2, seeds=[3], layout="A")
-    assert Counter((e.learner, e.decay) for e, _ in found) == Counter(
-        (name, decay) for name in PAPER for decay in DECAYS
-    )
-    for episodes, expected in ((300, design.SOLVER_EPISODES), (4, 4)):
-        pair = design.solver_pair(Experiment(episodes=episodes))
-        assert [(e.solver, e.episodes) for e in pair] == [
-            ("riccati", expected), ("ipopt", expected),
-        ]  # fmt: skip
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():
