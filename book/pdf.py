@@ -6,12 +6,13 @@ from pathlib import Path
 
 import click
 from bs4 import BeautifulSoup
-from driver.project import ROOT, Failure, pages, shown
+from driver.project import ROOT, Failure, from_yaml, pages, shown
 from playwright.sync_api import sync_playwright
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SCREEN = "script, style, button, figure.live, div.answer, .headerlink, .download"  # not for paper
 LOADED = "meta, link[rel=stylesheet], script:-soup-contains(MathJax), script[src*=mathjax]"
+CHAPTERS = "<style>body > div + div { break-before: page; }</style>"
 READY = "async () => { await MathJax.startup.promise; await document.fonts.ready; }"
 
 
@@ -32,7 +33,9 @@ def joined(site: Path) -> str:
             if (page or name) in soups:
                 link["href"] = f"#{page or name}{f'--{label}' if label else ''}"
         body += f'<div id="{name}">{soup.article}</div>\n'
-    head = "\n".join(map(str, next(iter(soups.values())).head.select(LOADED)))
+    title = f"<title>{from_yaml('_config.yml')['title']}</title>"
+    loaded = map(str, next(iter(soups.values())).head.select(LOADED))
+    head = "\n".join([title, *loaded, CHAPTERS])
     return f'<!DOCTYPE html><html lang="en" data-theme="light"><head>{head}</head><body>{body}'
 
 
