@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from nmpcrl import Vector, learning
 from nmpcrl.analysis.encounters import count
 from nmpcrl.analysis.search import LOWER, SCALE, SEARCHES, UPPER
 from nmpcrl.analysis.statistics import interquartile_mean, rate
-from nmpcrl.control import Nmpc, Task
+from nmpcrl.control import Nmpc, SolverError, Task
 from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, remedies, train
 from nmpcrl.learning.gauss_newton import closed_loop
 from nmpcrl.learning.optimisers import TrustRegion
@@ -407,12 +406,18 @@ def scores(judged: pd.DataFrame) -> dict[str, Any]:
 def followed(robot: Robot, policy: Policy) -> Rollout:
     """An episode of a policy in `nmpcrl/Robot-v0`."""
 
-    def solve(seen: Vector, *_: Any) -> SimpleNamespace:
-        return SimpleNamespace(action=np.array(ACTION.check("what the policy chose", policy(seen))))
-
-    acting = SimpleNamespace(solve=solve)
-    rollout = evaluate(acting, THETA, paper.STEPS, plant=robot.env())
-    return replace(rollout, states=rollout.states[:, : robot.task.start.size])
+    env, actions, costs, failure = robot.env(), [], [], ""
+    seen, _ = env.reset(seed=0)
+    try:
+        for _ in range(paper.STEPS):
+            chosen = np.array(ACTION.check("what the policy chose", policy(seen.copy())))
+            seen, reward, *_ = env.step(chosen)
+            actions.append(chosen)
+            costs.append(-reward)
+    except SolverError as error:  # of a policy that plans
+        failure = str(error)
+    states = np.reshape(env.states[: len(costs)], (-1, 3))
+    return Rollout(states, np.reshape(actions, (-1, 2)), np.array(costs), failure)
 
 
 def _rollout(robot: Robot, found: Any) -> Rollout:

@@ -37,7 +37,7 @@ class Environment:
 
 
 def environment(
-    nmpc: Nmpc | None,
+    nmpc: Nmpc,
     plant: Plant | StepFunction | GymnasiumEnv | None = None,
     start: Start | None = None,
     data: Data | None = None,
@@ -45,8 +45,7 @@ def environment(
     """The environment of an NMPC, checked.
 
     Args:
-        nmpc: has bounds, and where it has a task a start and the cost of Eq. (20). None if another
-            controller plans.
+        nmpc: has bounds, and where it has a task a start and the cost of Eq. (20).
         plant: a `Plant`, whose cost is the task's; or (state, action, rng) -> (next state, cost,
             end), for any other, such as a disturbed one, with any cost and end of its own. A fourth
             value, if there is one, ends the episode in a state that keeps its worth. A function of
@@ -62,31 +61,30 @@ def environment(
     """
     if hasattr(plant, "reset") and hasattr(plant, "action_space"):
         plant, start = of_gymnasium(plant, nmpc, start)
-    states, task = (nmpc.n, nmpc.task) if nmpc else (None, None)
-    if nmpc and task:
+    task = nmpc.task
+    if task:
         start = task.start if start is None else start
         plant = nmpc.plant if plant is None else plant
     if start is None or plant is None or (isinstance(plant, Plant) and not task):
         raise ValueError(
-            "a Problem plans, and says nothing of the environment, its start and its cost; nor does"
-            " a controller without an Nmpc:"
+            "a Problem plans, and says nothing of the environment, its start and its cost:"
             " give plant=(state, action, rng) -> (next state, cost, end), and start="
         )
-    if nmpc and task and isinstance(plant, Plant):
+    if isinstance(plant, Plant):
         step = charged(plant, task, nmpc)
     else:
         own = cast(StepFunction, plant)
         fits = [k for k in (3, 4, 5) if callable(own) and not mismatch(own, (None,) * k)]
         if fits and 3 not in fits:
-            ahead = forecasts(data, nmpc.horizon if nmpc else 0)
+            ahead = forecasts(data, nmpc.horizon)
             own, start = timed(own, start, lambda t: (t, ahead(t).get("data"))[: fits[0] - 3])
         refuse_other(PLANT, own, 3)
-        step = checked(own, states)
+        step = checked(own, nmpc.n)
     if callable(start):
         begin = start
         refuse_other("start is called as start(rng) and returns a state", begin, 1)
-        return Environment(step, lambda rng: state_of("start returned", begin(rng), states))
-    first = state_of("start =", start, states)
+        return Environment(step, lambda rng: state_of("start returned", begin(rng), nmpc.n))
+    first = state_of("start =", start, nmpc.n)
     return Environment(step, lambda _: first.copy())
 
 
@@ -104,12 +102,12 @@ def charged(plant: Plant, task: Task, nmpc: Nmpc) -> Callable[..., Step]:
     return step
 
 
-def unusable(state: Vector, cost: float, nmpc: Nmpc | None, *, end: bool) -> str:
+def unusable(state: Vector, cost: float, nmpc: Nmpc, *, end: bool) -> str:
     """Why a step ends its episode as a failed solve does; "" if it does not.
 
     Its cost is not finite, or no plan can begin in its state; an episode may end in any finite one.
     """
-    largest = sys.float_info.max if nmpc is None or end else nmpc.farthest
+    largest = sys.float_info.max if end else nmpc.farthest
     if all(abs(number) <= largest for number in state.tolist()):
         return "" if abs(cost) < np.inf else f"the plant's cost in state {short(state)} is {cost}"
     return (
@@ -118,10 +116,12 @@ def unusable(state: Vector, cost: float, nmpc: Nmpc | None, *, end: bool) -> str
     )
 
 
-def nmpc_of(controller: Any) -> Nmpc | None:
-    """The `Nmpc` that a controller is, or holds as an attribute; None where there is none."""
-    near = [controller, *getattr(controller, "__dict__", {}).values()]
-    return next((one for one in near if isinstance(one, Nmpc)), None)
+def nmpc_of(controller: Any) -> Nmpc:
+    """The `Nmpc` that a controller is, or holds as an attribute; ValueError where there is none."""
+    for one in (controller, *getattr(controller, "__dict__", {}).values()):
+        if isinstance(one, Nmpc):
+            return one
+    raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
 
 
 def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
@@ -131,13 +131,13 @@ def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
     return np.random.default_rng(rng)
 
 
-def state_of(said: str, given: Any, states: int | None, *, finite: bool = True) -> Vector:
-    """A copy of a user's state, shape (n,), or any where `states` is None; ValueError otherwise."""
+def state_of(said: str, given: Any, states: int, *, finite: bool = True) -> Vector:
+    """A copy of a user's state, shape (n,); ValueError for any other."""
     with suppress(TypeError, ValueError):
         state = np.array(given, float).reshape(-1)
-        if state.size == (states or state.size) and not (finite and not np.isfinite(state).all()):
+        if state.size == states and (not finite or np.isfinite(state).all()):
             return state
-    raise ValueError(f"{said} {given}; a state is {states or 'a vector of'} finite numbers")
+    raise ValueError(f"{said} {given}; a state is {states} finite numbers")
 
 
 def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:
@@ -152,7 +152,7 @@ def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:
 
 
 def of_gymnasium(
-    env: GymnasiumEnv, nmpc: Nmpc | None, start: Any
+    env: GymnasiumEnv, nmpc: Nmpc, start: Any
 ) -> tuple[StepFunction, Callable[[np.random.Generator], Vector]]:
     """`env` as plant and start: its observations are states, and minus its rewards are costs.
 
@@ -160,15 +160,13 @@ def of_gymnasium(
     """
     if start is not None:
         raise ValueError("a gymnasium.Env draws its own start: leave start= out")
-    sizes = (nmpc.n, nmpc.m) if nmpc else (None, None)
-    for name, size in zip(("observation_space", "action_space"), sizes, strict=True):
+    for name, size in (("observation_space", nmpc.n), ("action_space", nmpc.m)):
         space = getattr(env, name)
-        if not hasattr(space, "low") or (size and np.prod(space.shape) != size):
+        if not hasattr(space, "low") or np.prod(space.shape) != size:
             raise ValueError(f"{name} = {space} must be a Box of {size} numbers, as in the plan")
     if not np.issubdtype(space.dtype, np.floating):
         raise ValueError(f"action_space = {space} must hold floats: whole numbers cut actions off")
-    if nmpc:
-        refuse_narrower("the environment's actions", space.low.ravel(), space.high.ravel(), nmpc)
+    refuse_narrower("the environment's actions", space.low.ravel(), space.high.ravel(), nmpc)
 
     def begin(rng: np.random.Generator) -> Any:
         return env.reset(seed=int(rng.integers(2**31)))[0]
@@ -195,7 +193,7 @@ def timed(
     return lambda state, action, rng: plant(state, action, rng, *more(next(clock))), begin
 
 
-def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:
+def checked(plant: StepFunction, states: int) -> Callable[..., Step]:
     """A plant of the user, whose results are checked at each call; ValueError for a wrong one."""
 
     def step(state: Vector, action: Vector, rng: np.random.Generator) -> Step:

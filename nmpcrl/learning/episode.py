@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Solution
+from nmpcrl.control import Nmpc, Plant, Solution, Task
 from nmpcrl.control.codegen.jit import compiled, load
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.solvers import riccati
@@ -147,8 +147,7 @@ class Loop:
         fixed = nmpc.machine(fix_action=True) if machine and trainer.constrained else machine
         if not (plant and step and machine and fixed):
             raise CannotCompile("the loop does not know this learner, plant or solver")
-        advance = compiled(plant.transition)
-        cost = compiled(nmpc.task.charge(nmpc.m), returned=True)
+        advance, cost = environment_code(plant, nmpc.task)
         code = load("loop", TEXTS, NOTICE)
         self._code, self._machine, self._nmpc, self._valued = code, machine, nmpc, learner.bootstrap
         (slopes, *network), rule, beta = code.absent, code.loop.SEMI_GRADIENT, 0.0
@@ -219,6 +218,12 @@ class Loop:
         predicts, every, rate = (target.net, target.every, target.rate) if target else (net, 0, 0.0)
         how = valued.with_theta, valued.gated, valued.late, valued.fits, every, float(rate)
         return kinds.NETWORK, net, predicts, how
+
+
+@lru_cache(maxsize=256)
+def environment_code(plant: Plant, task: Task) -> tuple[Any, Any]:
+    """The transition of a plant and the cost of a task, compiled."""
+    return compiled(plant.transition), compiled(task.charge(plant.m), returned=True)
 
 
 def _known_step(learner: Learner, nmpc: Nmpc) -> SemiGradient | GradientTD | None:

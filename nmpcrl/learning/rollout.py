@@ -6,16 +6,11 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Plant, SolverError
-from nmpcrl.control.policy import Data, forecasts
-from nmpcrl.learning.environment import (
-    GymnasiumEnv,
-    StepFunction,
-    environment,
-    nmpc_of,
-    stream,
-    unusable,
-)
+from nmpcrl.learning.baselines import frozen
+from nmpcrl.learning.environment import nmpc_of, stream
+from nmpcrl.learning.episode import episodes
+from nmpcrl.learning.learners import Weights
+from nmpcrl.learning.training import Exploration
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +33,8 @@ def evaluate(
     theta: Vector,
     steps: int,
     *,
-    plant: Plant | StepFunction | GymnasiumEnv | None = None,
-    start: Any = None,
-    data: Data | None = None,
     rng: np.random.Generator | int = 0,
+    **environment: Any,
 ) -> Rollout:
     """Follow the policy of theta, Eq. (4), from the start and without noise.
 
@@ -49,32 +42,17 @@ def evaluate(
     then says so and costs infinitely much.
 
     Args:
-        controller: acts: an `Nmpc`, or an object with `solve(state, theta, plan before)`, whose
-            result has an `action`. One that holds an `Nmpc` has the environment of that by default.
+        controller: as in `train`.
         theta: NMPC parameters, shape (d,).
         steps: K + 1, the most states that are visited.
-        plant: as in `train`, like `start`, `data` and `rng`, of which an int gives other numbers.
+        rng: as in `train`, but an int gives other numbers.
+        environment: `plant`, `start` and `data`, as in `train`.
     """
-    nmpc, rng = nmpc_of(controller), stream(rng, 2)
-    around = environment(nmpc, plant, start, data)
-    state, plan, failure = around.start(rng), None, ""
-    states, actions, costs = [], [], []
-    ahead = forecasts(data, nmpc.horizon if nmpc else 0)
-    for t in range(steps):
-        try:
-            plan = controller.solve(state.copy(), theta, plan, **ahead(t))
-        except SolverError as error:
-            failure = str(error)
-            break
-        states.append(state)
-        actions.append(np.array(plan.action, float))
-        state, cost, end, cut = around.step(state, actions[-1], rng)
-        costs.append(cost)
-        failure = unusable(state, cost, nmpc, end=end)
-        if failure or end or cut:
-            break
-    inputs = nmpc.m if nmpc else actions[0].size if actions else 0
-    return Rollout(
-        np.reshape(states, (-1, state.size)), np.reshape(actions, (-1, inputs)), np.array(costs),
-        failure,
-    )  # fmt: skip
+    nmpc = nmpc_of(controller)
+    silent = Exploration(np.zeros((1, steps, nmpc.m)))
+    (found,) = episodes(
+        frozen(nmpc), controller, Weights(theta), silent, rng=stream(rng, 2), **environment
+    )
+    acted = ~np.isnan(found.columns["action"]).any(axis=1)  # all but a failed solve
+    visited = (found.columns[name][acted] for name in ("state", "action", "cost"))
+    return Rollout(*visited, found.failure)

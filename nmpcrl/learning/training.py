@@ -197,8 +197,6 @@ class Trainer:
         rng: np.random.Generator | int = 0,
     ) -> None:
         nmpc = nmpc_of(controller)
-        if nmpc is None:
-            raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
         if not isinstance(weights, Weights):
             raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta)")
         if explore.noise.shape[2] != nmpc.m:
