@@ -127,14 +127,14 @@ class Nmpc(Described):
             SolverError: no optimum was found; carries the status, the state and theta.
         """
         began = time.perf_counter()
-        state = _checked("state", state, self.n, self.farthest)
-        theta = _checked("theta", theta, self.problem.theta.size, self.largest)
+        state = bounded_vector("state", state, self.n, self.farthest)
+        theta = bounded_vector("theta", theta, self.problem.theta.size, self.largest)
         known = self.problem.stage_data(data)
         if min(theta.tolist()) < 0.0 and (theta < self._bending.least).any():
             self._bending.judge(state, theta, known)
         given = FREE
         if action is not None:
-            given = action = _checked("action", action, self.m, self._strongest)
+            given = action = bounded_vector("action", action, self.m, self._strongest)
             if (action < self.lower).any() or (action > self.upper).any():
                 bounds = f"{short(self.lower)} and {short(self.upper)}"
                 raise ValueError(f"action {short(action)} must lie between {bounds}")
@@ -203,7 +203,7 @@ class Nmpc(Described):
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """`value_hessian` times a vector of shape (d,); in microseconds by riccati."""
-        vector = _checked("vector", vector, solution.theta.size, self.largest)
+        vector = bounded_vector("vector", vector, solution.theta.size, self.largest)
         product = self._variant(solution).compiled(Compiled.hessian_times, solution, vector)
         return self.value_hessian(solution) @ vector if product is None else product
 
@@ -320,7 +320,7 @@ class Nmpc(Described):
         return Variant(ocp, self.solver)
 
 
-def _checked(name: str, vector: Vector, size: int, largest: float) -> Vector:
+def bounded_vector(name: str, vector: Vector, size: int, largest: float) -> Vector:
     """A copy of a vector of this size with no number larger."""
     vector = floats(name, vector)
     if vector.shape != (size,):

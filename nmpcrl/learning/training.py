@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Plant, Solution, SolverError
-from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.control.nmpc import ABSURD, bounded_vector
 from nmpcrl.control.policy import Data, forecasts
 from nmpcrl.control.solution import short
 from nmpcrl.control.vectors import integer
@@ -210,9 +210,11 @@ class Trainer:
                 " constrained=False"
             )
         self.learner, self.controller, self.nmpc, self.explore = learner, controller, nmpc, explore
-        self.weights = replace(
-            weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float)
+        theta, w = (
+            bounded_vector(name, vector, nmpc.problem.theta.size, nmpc.largest)
+            for name, vector in (("theta", weights.theta), ("w", weights.w))
         )
+        self.weights = replace(weights, theta=theta, w=w)
         self.clipped, self.constrained, self.rng = clipped, constrained, stream(rng, 1)
         self.environment = environment(nmpc, plant, start, data)
         self.ahead = forecasts(data, nmpc.horizon)  # the options of a solve at t

@@ -98,13 +98,13 @@ def test_a_run_goes_on_to_the_last_bit_in_another_process_too(nmpc, undo):
     assert len(whole.costs) == 4
 
 
-def test_an_episode_that_failed_is_told_once_and_a_theta_of_no_use_without_other_warnings(nmpc):
+def test_an_episode_that_failed_is_told_once_and_a_theta_of_no_use_is_refused(nmpc):
     away = {"plant": lambda x, u, rng: (x * np.nan, 0.0, False), "start": [0.0]}
     with pytest.warns(UserWarning, match=r"^episode 0 ended: no plan can begin in .*nan") as found:
         result = learn(nmpc, episodes=3, **away)
     assert [str(one.message) for one in found] == [*result.warnings]
-    absurd = learn(nmpc, theta=[1e9, 1, 0], episodes=2, **WORLD)
-    assert absurd.diverged.startswith("theta = [1.e+09")
+    with pytest.raises(ValueError, match=r"^theta \[1.e\+09 .*must hold finite numbers"):
+        learn(nmpc, theta=[1e9, 1, 0], episodes=2, **WORLD)
 
 
 def test_plans_that_violate_hard_rows_are_told_where_they_are_many():

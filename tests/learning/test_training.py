@@ -105,6 +105,11 @@ def call(robot, **options):
         (lambda nmpc: call(nmpc, weights=THETA), r"weights = array.* must be Weights: write We"),
         (lambda nmpc: call(nmpc, clipped=False), r"clipped = .* \[0.6    1.5708\].* QL has no Q\("),
         (lambda nmpc: call(nmpc, controller=5), "controller = 5 must be an Nmpc"),
+        (
+            lambda nmpc: call(nmpc, weights=Weights(THETA[:5])),
+            r"theta has shape \(5,\); it mu",
+        ),
+        (lambda nmpc: call(nmpc, weights=Weights(THETA, 1e7 * THETA)), r"^w \[.*must hold finite"),
     ],
 )
 def test_arguments_that_cannot_be_trained_are_refused_at_the_call(robot, refused, message):
