@@ -7,8 +7,8 @@ result by a rollout without noise.
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.batches import batched, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
+from nmpcrl.learning.environment import as_gymnasium
 from nmpcrl.learning.episode import Episode, episodes
-from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.learning.learn import Learned, learn
 from nmpcrl.learning.learners import (
     Learner,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -45,11 +45,8 @@ class NextValue:
     seconds: float = 0.0  #: spent on fit and prediction [s]; a solve keeps its own time
 
 
-class Bootstrap(Protocol):
-    """Anything that values the next state of a transition."""
-
-    def __call__(self, transition: Transition, theta: Vector) -> NextValue | None:
-        """Value `transition.next_state` under `theta`; None skips the learning step."""
+#: values `transition.next_state` under theta; None skips the learning step
+Bootstrap = Callable[[Transition, Vector], NextValue | None]
 
 
 @dataclass(frozen=True)

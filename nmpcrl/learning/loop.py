@@ -4,10 +4,9 @@
 its cost are arguments. For WebAssembly the same text is compiled with the functions of one plant.
 """
 
-from types import FunctionType
-
 import numpy as np
 from numba import float64, int64, njit, types, void
+from numba.extending import register_jitable
 
 from nmpcrl.control.solvers.codes import End, Start
 
@@ -43,27 +42,11 @@ SIGNATURE = int64(
 )  # fmt: skip
 
 
-def translated(*names):
-    """Functions of `updates` for numba, which takes no argument behind a star.
-
-    Each may call those before it.
-    """
-    done: dict[str, object] = {}
-    for name in names:
-        function = getattr(updates, name)
-        code = function.__code__
-        count = code.co_argcount + code.co_kwonlyargcount
-        code = code.replace(co_argcount=count, co_kwonlyargcount=0)
-        done[name] = plain(FunctionType(code, function.__globals__ | done, name))
-    return done.values()
-
-
-_, td_error, project, semi_gradient_step, gradient_td_step, auxiliary_step, curvature_correction = (
-    translated(
-        "dot", "td_error", "project", "semi_gradient_step", "gradient_td_step", "auxiliary_step",
-        "curvature_correction",
-    )
-)  # fmt: skip
+for equation in (
+    updates.dot, updates.td_error, updates.project, updates.semi_gradient_step,
+    updates.gradient_td_step, updates.auxiliary_step, updates.curvature_correction,
+):  # fmt: skip
+    register_jitable(equation)  # which stays a function of Python
 
 
 @plain
@@ -95,11 +78,11 @@ def start_in(state, warm):
 def move(rule, theta, w, delta, phi, phi_next, product, alpha, beta, gamma):
     """The next theta; w moves in place, and `product` is the Hessian times w."""
     if rule == SEMI_GRADIENT:
-        return semi_gradient_step(theta, delta, phi, alpha)
-    moved = gradient_td_step(theta, w, delta, phi, phi_next, alpha, gamma)
+        return updates.semi_gradient_step(theta, delta, phi, alpha)
+    moved = updates.gradient_td_step(theta, w, delta, phi, phi_next, alpha, gamma)
     if rule == EXACT:
-        moved = moved - alpha * curvature_correction(delta, phi, w, product)
-    copy(auxiliary_step(w, delta, phi, beta), w)
+        moved = moved - alpha * updates.curvature_correction(delta, phi, w, product)
+    copy(updates.auxiliary_step(w, delta, phi, beta), w)
     return moved
 
 
@@ -179,7 +162,7 @@ def episode(
             return t
         solves, phi, action = 1, plan[split:], plan[n : n + m] + noise[t]
         if clipped:
-            action = project(action, problem[1], problem[2])  # departure E
+            action = updates.project(action, problem[1], problem[2])  # departure E
         transition(state, action, later)
         cost = charge(state, action, problem[0][0])
         if not usable(later, farthest):
@@ -223,10 +206,10 @@ def episode(
                 np.concatenate((state, action, theta))[:inputs], value,
                 np.concatenate((later, solution[next_input : next_input + m], theta))[:inputs],
             )  # fmt: skip
-        delta = td_error(cost, gamma, value, next_value)
+        delta = updates.td_error(cost, gamma, value, next_value)
         if known:
             moved = move(rule, theta, w, delta, phi, successor[split:], product, alpha, beta, gamma)
-            copy(project(moved, least, most), theta)
+            copy(updates.project(moved, least, most), theta)
         numbers = (
             cost, value, next_value, delta, loss, restarts, violation, iterations, float(solves),
         )  # fmt: skip

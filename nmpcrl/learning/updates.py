@@ -26,7 +26,7 @@ def semi_gradient_step(theta: Vector, delta: float, phi: Vector, alpha: float) -
 
 
 def gradient_td_step(
-    theta: Vector, w: Vector, delta: float, phi: Vector, phi_next: Vector, *, alpha: float,
+    theta: Vector, w: Vector, delta: float, phi: Vector, phi_next: Vector, alpha: float,
     gamma: float,
 ) -> Vector:  # fmt: skip
     """theta of GES, the first line of Eq. (16); all vectors of shape (d,).

@@ -19,8 +19,7 @@ from mpcrl.optim import NewtonMethod
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Problem
-from nmpcrl.learning.environment import StepFunction
-from nmpcrl.learning.gymnasium import as_gymnasium
+from nmpcrl.learning.environment import StepFunction, as_gymnasium
 from nmpcrl.study.problems import gros_zanon as gz
 
 RATE = 0.05  # of mpcrl's example
