@@ -28,14 +28,7 @@ from nmpcrl.learning.policy_gradient import policy_gradient
 from nmpcrl.learning.remedies import scheduled
 from nmpcrl.learning.replay import replayed
 from nmpcrl.learning.rollout import Rollout, evaluate
-from nmpcrl.learning.training import (
-    Diverged,
-    Exploration,
-    Step,
-    count_episodes,
-    count_steps,
-    train,
-)
+from nmpcrl.learning.training import Diverged, Exploration, Step, count_episodes, count_steps, train
 from nmpcrl.learning.updates import (
     auxiliary_step,
     curvature_correction,

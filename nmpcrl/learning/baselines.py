@@ -16,13 +16,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.learning.bootstrap import Transition
-from nmpcrl.learning.learners import (
-    Learner,
-    Move,
-    UpdateRule,
-    gradient_td,
-    semi_gradient,
-)
+from nmpcrl.learning.learners import Learner, Move, UpdateRule, gradient_td, semi_gradient
 from nmpcrl.learning.updates import of_length
 
 

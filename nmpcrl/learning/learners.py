@@ -24,13 +24,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.control.vectors import step_size
-from nmpcrl.learning.bootstrap import (
-    Bootstrap,
-    Imitation,
-    NextValue,
-    SecondSolve,
-    Transition,
-)
+from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
 from nmpcrl.learning.optimisers import Bounds
 from nmpcrl.learning.updates import (
     auxiliary_step,
