@@ -99,17 +99,12 @@ def call(robot, **options):
     ("refused", "message"),
     [
         (lambda _: Exploration(np.zeros((2, 5)), np.ones((2, 5))), r"\(2, 5\) .*\(episodes, steps"),
-        (lambda _: Exploration(np.zeros((2, 5, 2)), np.ones(2)), r"scale \(2,\): .*\(episodes"),
         (lambda _: Exploration(np.zeros((2, 5, 2)), np.ones((2, 4))), r"scale \(2, 4\): .*\(epis"),
         (lambda nmpc: call(nmpc, explore=noise(1, 3, 1)), "1 numbers a step; the NMPC has 2 i"),
         (lambda nmpc: call(nmpc, weights=THETA), r"weights = array.* must be Weights: write We"),
         (lambda nmpc: call(nmpc, clipped=False), r"clipped = .* \[0.6    1.5708\].* QL has no Q\("),
         (lambda nmpc: call(nmpc, controller=5), "controller = 5 must be an Nmpc"),
-        (
-            lambda nmpc: call(nmpc, weights=Weights(THETA[:5])),
-            r"theta has shape \(5,\); it mu",
-        ),
-        (lambda nmpc: call(nmpc, weights=Weights(THETA, 1e7 * THETA)), r"^w \[.*must hold finite"),
+        (lambda nmpc: call(nmpc, weights=Weights(THETA[:5])), r"theta has shape \(5,\); it must "),
     ],
 )
 def test_arguments_that_cannot_be_trained_are_refused_at_the_call(robot, refused, message):
