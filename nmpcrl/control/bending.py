@@ -23,6 +23,7 @@ class Bending:
         self._problem = problem
         self._bends = ca.Function("bends", [e.x, e.u, e.theta, e.d], bends)
         self.least = np.where(weighs & (problem.theta > 0), 0.0, -np.inf)
+        self.said: list[str] = []  # the warnings given
 
     def judge(self, state: Vector, theta: Vector, data: Matrix) -> None:
         """Warn if a cost bends downwards for the entries of theta below `least`.
@@ -41,10 +42,10 @@ class Bending:
             (found, *_), (other, *_) = np.linalg.eigvalsh(bends)
             if found < min(0.0, other) - ROUNDING * np.abs(bends).max():
                 self.least = np.where(fell, -np.inf, self.least)
-                warnings.warn(
+                self.said.append(
                     f"theta {of.names.marked(fell)} turned negative, and a cost of the plan bends"
                     f" downwards in state {short(state)}, so that a worst plan may be taken for"
-                    " the best: write Parameter(start, lower=0), and learners keep it positive",
-                    stacklevel=3,
+                    " the best: write Parameter(start, lower=0), and learners keep it positive"
                 )
+                warnings.warn(self.said[-1], stacklevel=3)
                 return

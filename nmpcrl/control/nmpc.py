@@ -130,8 +130,8 @@ class Nmpc(Described):
         state = bounded_vector("state", state, self.n, self.farthest)
         theta = bounded_vector("theta", theta, self.problem.theta.size, self.largest)
         known = self.problem.stage_data(data)
-        if min(theta.tolist()) < 0.0 and (theta < self._bending.least).any():
-            self._bending.judge(state, theta, known)
+        if min(theta.tolist()) < 0.0 and (theta < self.bending.least).any():
+            self.bending.judge(state, theta, known)
         given = FREE
         if action is not None:
             given = action = bounded_vector("action", action, self.m, self._strongest)
@@ -190,8 +190,8 @@ class Nmpc(Described):
             usable &= (np.abs(actions) <= self._strongest).all(1)
         known = stage_data(self.problem, data or {}, len(states))
         for k in np.flatnonzero(usable & (thetas < 0).any(1)).tolist():
-            if (thetas[k] < self._bending.least).any():
-                self._bending.judge(states[k], thetas[k], known[min(k, len(known) - 1)])
+            if (thetas[k] < self.bending.least).any():
+                self.bending.judge(states[k], thetas[k], known[min(k, len(known) - 1)])
         variant = self._free if actions is None else self._fixed
         threads = cpu_count() if threads is None else integer("threads", threads)
         return solve_many(variant, usable, states, thetas, warm_starts, actions, known, threads)
@@ -303,7 +303,8 @@ class Nmpc(Described):
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
     @cached_property
-    def _bending(self) -> Bending:
+    def bending(self) -> Bending:
+        """Warns where a learned weight turns negative."""
         return Bending(self.problem)
 
     @cached_property

@@ -11,7 +11,6 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Policy
-from nmpcrl.control.bending import Bending
 from nmpcrl.control.policy import Data
 from nmpcrl.control.solution import short
 from nmpcrl.control.vectors import floats, integer, spread
@@ -96,10 +95,10 @@ def learn(
 ) -> Learned:
     """Learn theta from episodes with noise: `learn(nmpc, plant=plant, start=[1, 0]).theta["mass"]`.
 
-    It warns, once each, where a step size is so large that steps overshoot, where a weight of a
-    cost turns negative, where an episode ends in a failed solve, where many plans violate hard
-    rows, and where the noise is clipped at both bounds of an input. A divergence is no error: the
-    result says so, with what was reached before.
+    It warns, once each, where a step size is so large that steps overshoot, where an episode ends
+    in a failed solve, where many plans violate hard rows, and where the noise is clipped at both
+    bounds of an input; its solves do where a weight of a cost turns negative. A divergence is no
+    error: the result says so, with what was reached before.
 
     Args:
         nmpc: the controller whose theta is learned.
@@ -137,7 +136,7 @@ def learn(
     explore = Exploration(episodes=episodes, steps=steps, deviation=noise, seed=seed, first=done)
     around: dict[str, Any] = {"plant": plant, "start": start, "data": data}
     costs = [*resume.costs] if resume else []
-    least = Bending(nmpc.problem).least
+    warned = len(nmpc.bending.said)
     said: dict[str, str] = {}
     found: list[Episode] = []
     diverged = ""
@@ -159,20 +158,17 @@ def learn(
     elif resume is None and confirm:
         judge(weights.theta)
     try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "theta .* turned negative, and a cost")  # of a solve
-            for one in by_episode(mover, nmpc, weights, explore, rng=rng, **around):
-                found.append(replace(one, number=done + one.number))
-                warn("failed", one.failure and f"episode {found[-1].number} ended: {one.failure}")
-                warn("violated", _violated(found[-1]))
-                warn("overshoot", _overshoot(base, found[-1]))
-                warn("negative", _negative(nmpc, least, found[-1]))
-                if not absurd(one.weights, nmpc.largest):
-                    weights = one.weights
-                if confirm and not undo and not (found[-1].number + 1) % confirm:
-                    judge(one.weights.theta)
-                if callback is not None and callback(found[-1]) is False:
-                    break
+        for one in by_episode(mover, nmpc, weights, explore, rng=rng, **around):
+            found.append(replace(one, number=done + one.number))
+            warn("failed", one.failure and f"episode {found[-1].number} ended: {one.failure}")
+            warn("violated", _violated(found[-1]))
+            warn("overshoot", _overshoot(base, found[-1]))
+            if not absurd(one.weights, nmpc.largest):
+                weights = one.weights
+            if confirm and not undo and not (found[-1].number + 1) % confirm:
+                judge(one.weights.theta)
+            if callback is not None and callback(found[-1]) is False:
+                break
     except Diverged as error:
         diverged = str(error)
     history = {"episode": np.repeat([one.number for one in found], [one.steps for one in found])}
@@ -187,8 +183,8 @@ def learn(
              f" lower and upper bounds, where noise is clipped: deviation={short(noise)} may be too"
              " large")  # fmt: skip
     return Learned(
-        nmpc, weights, history, np.array(costs), diverged, (*said.values(),), done + len(found),
-        seed, rng,
+        nmpc, weights, history, np.array(costs), diverged,
+        (*said.values(), *nmpc.bending.said[warned:]), done + len(found), seed, rng,
     )  # fmt: skip
 
 
@@ -249,16 +245,4 @@ def _overshoot(learner: Learner, episode: Episode) -> str:
     return (
         f"alpha ||phi||^2 is {alpha * square:.3g} in episode {episode.number}; above {OVERSHOOT:g}"
         f" a step makes its own error larger: take an alpha below {OVERSHOOT / square:.2g}"
-    )
-
-
-def _negative(nmpc: Nmpc, least: Vector, episode: Episode) -> str:
-    """The warning of entries of theta that fell below `least`; "" where none did."""
-    fell = (episode.columns["theta"] < least).any(axis=0)
-    if not fell.any():
-        return ""
-    names = nmpc.problem.names.marked(fell)
-    return (
-        f"theta {names} turned negative in episode {episode.number}, and weighs a cost, which may"
-        " then bend downwards: write Parameter(start, lower=0), and learners keep it positive"
     )
