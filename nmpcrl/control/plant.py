@@ -102,12 +102,9 @@ class Plant(Described):
         later = rk4(self._derivative, state, action, self.period, self.substeps)
         return ca.Function("f", [state, action], [later], ["state", "action"], ["later"])
 
-    def step(self, state: Vector, action: Vector) -> Vector:
-        """The state one period later, shape (n,): Eq. (18)."""
-        return self._step(state, action)
-
     @cached_property
-    def _step(self) -> Callable[[Vector, Vector], Vector]:
+    def step(self) -> Callable[[Vector, Vector], Vector]:
+        """(state, action) -> the state one period later, shape (n,): Eq. (18)."""
         return callable_of(self.transition)
 
     def clip(self, action: Vector) -> Vector:

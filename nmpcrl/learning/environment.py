@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 # next state, cost l(s, a), whether the episode ends there, and whether only its time does
 Step = tuple[Vector, float, bool, bool]
 StepFunction = Callable[[Vector, Vector, np.random.Generator], tuple[Any, ...]]
-GymnasiumEnv = Any  # a `gymnasium.Env`, which need not be installed
 Start = Vector | Callable[[np.random.Generator], Vector]
 PLANT = "plant is called as plant(state, action, rng) and returns (next state, cost, end)"
 
@@ -41,7 +40,7 @@ class Environment:
 
 def environment(
     nmpc: Nmpc,
-    plant: Plant | StepFunction | GymnasiumEnv | None = None,
+    plant: Any = None,
     start: Start | None = None,
     data: Data | None = None,
 ) -> Environment:
@@ -119,14 +118,6 @@ def unusable(state: Vector, cost: float, nmpc: Nmpc, *, end: bool) -> str:
     )
 
 
-def nmpc_of(controller: Any) -> Nmpc:
-    """The `Nmpc` that a controller is, or holds as an attribute; ValueError where there is none."""
-    for one in (controller, *getattr(controller, "__dict__", {}).values()):
-        if isinstance(one, Nmpc):
-            return one
-    raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
-
-
 def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
     """A generator as it is, or one of an int, apart from the stream of `default_rng` of it."""
     if isinstance(rng, int | np.integer):
@@ -155,7 +146,7 @@ def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:
 
 
 def of_gymnasium(
-    env: GymnasiumEnv, nmpc: Nmpc, start: Any
+    env: Any, nmpc: Nmpc, start: Any
 ) -> tuple[StepFunction, Callable[[np.random.Generator], Vector]]:
     """`env` as plant and start: its observations are states, and minus its rewards are costs.
 

@@ -73,7 +73,7 @@ class Episode:
 
 
 def episodes(
-    learner: Learner, controller: Any, weights: Weights, explore: Exploration, **options: Any
+    learner: Learner, controller: Nmpc, weights: Weights, explore: Exploration, **options: Any
 ) -> Iterator[Episode]:
     """The steps of `train` to the last bit, by episodes; the arguments are the same.
 
@@ -142,7 +142,7 @@ class Loop:
             CannotCompile: the loop does not know a part.
         """
         learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
-        step, own = _known_step(learner, nmpc), type(nmpc) is Nmpc and trainer.controller is nmpc
+        step, own = _known_step(learner, nmpc), type(nmpc) is Nmpc
         machine = nmpc.machine(fix_action=False) if own and step and plant else None
         fixed = nmpc.machine(fix_action=True) if machine and trainer.constrained else machine
         if not (plant and step and machine and fixed):

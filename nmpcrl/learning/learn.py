@@ -15,7 +15,7 @@ from nmpcrl.control.policy import Data
 from nmpcrl.control.solution import short
 from nmpcrl.control.vectors import floats, integer, spread
 from nmpcrl.learning.batches import lstd_q
-from nmpcrl.learning.environment import GymnasiumEnv, StepFunction, stream
+from nmpcrl.learning.environment import stream
 from nmpcrl.learning.episode import Episode
 from nmpcrl.learning.episode import episodes as by_episode
 from nmpcrl.learning.learners import (
@@ -79,7 +79,7 @@ def learn(
     nmpc: Nmpc,
     learner: Learner | str = "LSTD-Q",
     *,
-    plant: StepFunction | GymnasiumEnv | None = None,
+    plant: Any = None,
     start: Any = None,
     data: Data | None = None,
     episodes: int = 20,

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control import Nmpc
 from nmpcrl.learning.baselines import frozen
-from nmpcrl.learning.environment import nmpc_of, stream
+from nmpcrl.learning.environment import stream
 from nmpcrl.learning.episode import episodes
 from nmpcrl.learning.learners import Weights
 from nmpcrl.learning.training import Exploration
@@ -29,7 +30,7 @@ class Rollout:
 
 
 def evaluate(
-    controller: Any,
+    controller: Nmpc,
     theta: Vector,
     steps: int,
     *,
@@ -48,10 +49,11 @@ def evaluate(
         rng: as in `train`, but an int gives other numbers.
         environment: `plant`, `start` and `data`, as in `train`.
     """
-    nmpc = nmpc_of(controller)
-    silent = Exploration(np.zeros((1, steps, nmpc.m)))
+    if not isinstance(controller, Nmpc):
+        raise ValueError(f"controller = {controller!r} must be an Nmpc")
+    silent = Exploration(np.zeros((1, steps, controller.m)))
     (found,) = episodes(
-        frozen(nmpc), controller, Weights(theta), silent, rng=stream(rng, 2), **environment
+        frozen(controller), controller, Weights(theta), silent, rng=stream(rng, 2), **environment
     )
     acted = ~np.isnan(found.columns["action"]).any(axis=1)  # all but a failed solve
     visited = (found.columns[name][acted] for name in ("state", "action", "cost"))

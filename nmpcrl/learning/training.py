@@ -9,20 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Plant, Solution, SolverError
+from nmpcrl.control import Nmpc, Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD, bounded_vector
 from nmpcrl.control.policy import Data, forecasts
 from nmpcrl.control.solution import short
 from nmpcrl.control.vectors import integer
 from nmpcrl.learning.bootstrap import Transition
-from nmpcrl.learning.environment import (
-    GymnasiumEnv,
-    StepFunction,
-    environment,
-    nmpc_of,
-    stream,
-    unusable,
-)
+from nmpcrl.learning.environment import environment, stream, unusable
 from nmpcrl.learning.learners import Learner, Update, Weights
 
 Counts = NDArray[np.int_]  # k of each step, shape (episodes, steps)
@@ -143,7 +136,7 @@ class Exploration:
 
 
 def train(
-    learner: Learner, controller: Any, weights: Weights, explore: Exploration, **options: Any
+    learner: Learner, controller: Nmpc, weights: Weights, explore: Exploration, **options: Any
 ) -> Iterator[Step]:
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
@@ -153,8 +146,7 @@ def train(
 
     Args:
         learner: moves the weights.
-        controller: acts, and is what is learned: an `Nmpc`, or an object that holds one and has
-            its `solve`.
+        controller: acts, and is what is learned.
         weights: to start with.
         explore: the noise.
         clipped: whether actions are kept in the action space, by default; they must be where
@@ -185,18 +177,20 @@ class Trainer:
     def __init__(
         self,
         learner: Learner,
-        controller: Any,
+        controller: Nmpc,
         weights: Weights,
         explore: Exploration,
         *,
         clipped: bool = True,
         constrained: bool | None = None,
-        plant: Plant | StepFunction | GymnasiumEnv | None = None,
+        plant: Any = None,
         start: Any = None,
         data: Data | None = None,
         rng: np.random.Generator | int = 0,
     ) -> None:
-        nmpc = nmpc_of(controller)
+        nmpc = controller
+        if not isinstance(nmpc, Nmpc):
+            raise ValueError(f"controller = {controller!r} must be an Nmpc")
         if not isinstance(weights, Weights):
             raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta)")
         if explore.noise.shape[2] != nmpc.m:
@@ -209,7 +203,7 @@ class Trainer:
                 f" where {learner.name} has no Q(s, a): leave it out, or learn V(s) by"
                 " constrained=False"
             )
-        self.learner, self.controller, self.nmpc, self.explore = learner, controller, nmpc, explore
+        self.learner, self.nmpc, self.explore = learner, nmpc, explore
         theta, w = (
             bounded_vector(name, vector, nmpc.problem.theta.size, nmpc.largest)
             for name, vector in (("theta", weights.theta), ("w", weights.w))
@@ -244,11 +238,11 @@ class Trainer:
         self, episode: int, first: int, state: Vector, weights: Weights, warm: Solution | None
     ) -> Iterator[Step]:
         """The steps of an episode from the first on; the last one says so if a solve failed."""
-        controller, nmpc, known = self.controller, self.nmpc, self.ahead(first)
+        nmpc, known = self.nmpc, self.ahead(first)
         final = self.explore.scale.shape[1] - 1
         for t in range(first, final + 1):
             try:
-                plan = controller.solve(state, weights.theta, warm, **known)
+                plan = nmpc.solve(state, weights.theta, warm, **known)
             except SolverError as error:
                 yield self._failed(error, episode, t, state, weights, np.full(nmpc.m, np.nan))
                 return
@@ -264,7 +258,7 @@ class Trainer:
             solution = None if self.constrained else plan
             try:
                 if solution is None:
-                    solution = controller.solve(state, weights.theta, plan, action, **known)
+                    solution = nmpc.solve(state, weights.theta, plan, action, **known)
                 transition = Transition(
                     state, action, cost, next_state, solution, end, last, later.get("data"),
                     first=t == 0,
