@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -75,13 +75,12 @@ def environment(
     if isinstance(plant, Plant):
         step = charged(plant, task, nmpc)
     else:
-        own = cast(StepFunction, plant)
-        fits = [k for k in (3, 4, 5) if callable(own) and not mismatch(own, (None,) * k)]
+        fits = [k for k in (3, 4, 5) if callable(plant) and not mismatch(plant, (None,) * k)]
         if fits and 3 not in fits:
             ahead = forecasts(data, nmpc.horizon)
-            own, start = timed(own, start, lambda t: (t, ahead(t).get("data"))[: fits[0] - 3])
-        refuse_other(PLANT, own, 3)
-        step = checked(own, nmpc.n)
+            plant, start = timed(plant, start, lambda t: (t, ahead(t).get("data"))[: fits[0] - 3])
+        refuse_other(PLANT, plant, 3)
+        step = checked(plant, nmpc.n)
     if callable(start):
         begin = start
         refuse_other("start is called as start(rng) and returns a state", begin, 1)
