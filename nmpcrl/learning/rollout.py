@@ -56,5 +56,5 @@ def evaluate(
         frozen(controller), controller, Weights(theta), silent, rng=stream(rng, 2), **environment
     )
     acted = ~np.isnan(found.columns["action"]).any(axis=1)  # all but a failed solve
-    visited = (found.columns[name][acted] for name in ("state", "action", "cost"))
-    return Rollout(*visited, found.failure)
+    states, actions, costs = (found.columns[name][acted] for name in ("state", "action", "cost"))
+    return Rollout(states, actions, costs, found.failure)
