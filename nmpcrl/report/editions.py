@@ -21,15 +21,14 @@ from nmpcrl.claims.finding import finding
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import RUNS, SEARCHES, TIMINGS
-from nmpcrl.claims.verdict import Outcome, Verdict
-from nmpcrl.report.cited import Count
+from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report.tables import shown
 from nmpcrl.report.text import SURE
 from nmpcrl.studies import interventions, population, remedies
 from nmpcrl.studies.agents import SAC_AND_TD3
 from nmpcrl.studies.difficulty import DIFFICULTY
 from nmpcrl.studies.interventions import INTERVENTIONS
-from nmpcrl.studies.investigation import WORDS, Answer, Investigation
+from nmpcrl.studies.investigation import WORDS, Answer, Investigation, Question
 from nmpcrl.studies.main_study import gather
 from nmpcrl.studies.other_problems import OTHER_PROBLEMS
 from nmpcrl.studies.population import POPULATION
@@ -97,6 +96,13 @@ GROUPS: Mapping[str, tuple[Part, ...]] = {  # with the published parts that each
     "Changing worlds": _parts(WORLDS),
     "Other people's problems": _parts(OTHER_PROBLEMS),
 }
+ASKED: Mapping[str, Investigation] = {  # groups of answers
+    "Stopped runs made again": INTERVENTIONS,
+    "Remedies": REMEDIES,
+    "SAC and TD3": SAC_AND_TD3,
+    "Changing worlds": WORLDS,
+    "Other people's problems": OTHER_PROBLEMS,
+}
 
 
 def found() -> list[Line]:
@@ -107,33 +113,30 @@ def found() -> list[Line]:
         *_finding(known),
         *_variants(),
         *_drawn(),
-        *_answered("Stopped runs made again", INTERVENTIONS, INTERVENTIONS.table()),
         *_made_again(),
-        *_answered("Remedies", REMEDIES, REMEDIES.table()),
         *_advice(),
-        *_answered("SAC and TD3", SAC_AND_TD3, SAC_AND_TD3.table()),
-        *_answered("Changing worlds", WORLDS, WORLDS.table()),
-        *_answered("Other people's problems", OTHER_PROBLEMS, OTHER_PROBLEMS.table()),
+        *(
+            _answer(group, question, answer)
+            for group, one in ASKED.items()
+            for question, answer in zip(
+                one.questions, one.answers(one.table()).values(), strict=True
+            )
+        ),
     ]
 
 
 @cache
 def first() -> tuple[Line, ...]:
     """The lines of the first edition."""
-    read = json.loads((published.folder() / FILE).read_text("utf-8"))
-    return tuple(Line(**_numbers(row)) for row in read["lines"])
+    read = json.loads((published.folder() / FILE).read_text("utf-8"))["lines"]
+    numbers = ("value", "low", "high")
+    return tuple(Line(**row | {n: float(row[n]) for n in numbers if n in row}) for row in read)
 
 
 def is_anew(part: Part) -> bool:
     """Whether the published rows of a part are of a later edition than the first."""
     then = published.epochs(published.about(part[0]), part[1])
     return bool(then) and then != FIRST
-
-
-def parts_anew() -> Count:
-    """How many of the parts of all groups are of a later edition."""
-    every = {part for parts in GROUPS.values() for part in parts}
-    return Count(sum(map(is_anew, every)), len(every))
 
 
 def parts_table() -> pd.DataFrame:
@@ -162,31 +165,19 @@ def compared(today: Iterable[Line]) -> pd.DataFrame:
 
 def summary(both: pd.DataFrame) -> pd.DataFrame:
     """A row a group: its parts made anew and all, its outcomes and numbers, and how many stand."""
-    rows = []
-    for group, parts in GROUPS.items():
-        lines = both[both.group == group]
-        outcomes = lines["first"].map(lambda one: bool(one.outcome)).astype(bool)
-        judged = lines[~outcomes & lines.stands.notna()].stands
-        said = lines[outcomes].stands
-        anew = sum(map(is_anew, parts))
-        counts = (anew, len(parts), int(said.sum()), len(said), int(judged.sum()), len(judged))
-        rows.append((group, *counts))
-    names = ["group", "anew", "parts", "standing", "outcomes", "overlapping", "numbers"]
-    return pd.DataFrame(rows, columns=names).set_index("group")
-
-
-def summary_table(counts: pd.DataFrame) -> pd.DataFrame:
-    """The rows of `summary` as a page shows them."""
-    pairs = {
-        "parts made anew": ("anew", "parts"),
-        "outcomes that stand": ("standing", "outcomes"),
-        "intervals that overlap": ("overlapping", "numbers"),
-    }
-    columns = {
-        name: [str(Count(*pair)) for pair in zip(counts[yes], counts[of], strict=True)]
-        for name, (yes, of) in pairs.items()
-    }
-    return pd.DataFrame(columns, counts.index).rename_axis(None).replace("0 of 0", "")
+    known = both[both.stands.notna()]
+    outcomes = known["first"].map(lambda one: bool(one.outcome)).astype(bool)
+    counts = pd.DataFrame(
+        {
+            "anew": {group: sum(map(is_anew, parts)) for group, parts in GROUPS.items()},
+            "parts": {group: len(parts) for group, parts in GROUPS.items()},
+        }
+    )
+    names = {("standing", "outcomes"): outcomes, ("overlapping", "numbers"): ~outcomes}
+    for (stand, all_of_them), chosen in names.items():
+        by_group = known[chosen].stands.astype(int).groupby(known.group)
+        counts[stand], counts[all_of_them] = by_group.sum(), by_group.size()
+    return counts.fillna(0).astype(int).rename_axis("group")
 
 
 def table(both: pd.DataFrame, group: str) -> str:
@@ -206,6 +197,16 @@ def table(both: pd.DataFrame, group: str) -> str:
 # Lines of each source.
 
 
+def _line(group: str, name: str, number: Any, unit: str = "runs") -> Line:
+    """A number: an estimate, a count (yes, of) with its share, or one without an interval."""
+    counts = ""
+    if isinstance(number, tuple):
+        counts, number = "{} of {} {}".format(*number, unit), rate(*number)
+    if not isinstance(number, Estimate):
+        return Line(group, name, value=float(number))
+    return Line(group, name, "", "", "", number.value, number.low, number.high, counts)
+
+
 def _verdict(verdict: Verdict) -> Line:
     group = "Our own claims" if verdict.claim in OWN_CLAIMS else "The paper's claims"
     if verdict.claim in BY_TIME:
@@ -218,38 +219,16 @@ def _verdict(verdict: Verdict) -> Line:
     return Line(group, verdict.claim, statement, "", verdict.words, value, low, high, counts)
 
 
-def _answered(
-    group: str, investigation: Investigation, table: pd.DataFrame, known: Any = None
-) -> list[Line]:
-    """The answers of an investigation; `known` is what its questions are asked of."""
-    answers = investigation.judge(investigation.evidence(table) if known is None else known)
-    return [
-        _answer(group, one.name, one.question, one.expected, answers[one.name])
-        for one in investigation.questions
-    ]
-
-
-def _answer(group: str, name: str, text: str, expected: Outcome, answer: Answer) -> Line:
+def _answer(group: str, asked: Question, answer: Answer) -> Line:
     counts = {**answer.counts, **answer.beside}
     said = ", ".join(f"{yes} of {of} {unit}" for unit, (yes, of) in counts.items())
-    share = Estimate(*[None] * 3)  # type: ignore[arg-type]
-    if len(answer.counts) == 1:
-        ((yes, of),) = answer.counts.values()
-        share = rate(yes, of) if of else share
-    word = WORDS.get(expected, str(expected))
-    interval = share.value, share.low, share.high
-    return Line(group, name, text, word, answer.words, *interval, said)
-
-
-def _count(group: str, name: str, yes: int, of: int, unit: str = "runs") -> Line:
-    share = rate(yes, of)
-    return Line(
-        group, name, "", "", "", share.value, share.low, share.high, f"{yes} of {of} {unit}"
-    )
-
-
-def _estimate(group: str, name: str, estimate: Estimate) -> Line:
-    return Line(group, name, "", "", "", estimate.value, estimate.low, estimate.high)
+    expected = WORDS.get(asked.expected, str(asked.expected))
+    line = Line(group, asked.name, asked.question, expected, answer.words, counts=said)
+    only = [*answer.counts.values()]
+    if len(only) != 1 or not only[0][1]:
+        return line
+    share = rate(*only[0])
+    return replace(line, value=share.value, low=share.low, high=share.high)
 
 
 def _finding(known: study.Published) -> list[Line]:
@@ -257,7 +236,7 @@ def _finding(known: study.Published) -> list[Line]:
     group, one = "The finding in numbers", finding(known)
     if one.empty:
         return []
-    runs = {
+    numbers = {
         "ES and GES: runs with open gaps that solve their layout": one.arrived_open,
         "ES and GES: runs with a closed gap that solve it": one.arrived_closed,
         "RDES: runs that were stopped, noise per episode": one.stopped,
@@ -270,19 +249,13 @@ def _finding(known: study.Published) -> list[Line]:
         ),
         **{f"{name}: runs that did not end at the target": n for name, n in one.not_there.items()},
         **{f"{name}: runs that cost more than theta_init": n for name, n in one.above.items()},
-    }  # fmt: skip
-    layouts = {
-        "theta_c by hand: layouts solved": one.by_hand,
-        "theta_c by hand: layouts where it costs less than any run of ES and GES": one.better,
-    }
-    numbers = {
         "ES and GES: median reduction of the cost with open gaps": one.learned,
         "theta_c by hand: median reduction where it solves": one.saved_by_hand,
         "ES and GES: median reduction there": one.saved_there,
         "theta_c by hand: least increase elsewhere": one.lost_by_hand[0],
         "theta_c by hand: greatest increase elsewhere": one.lost_by_hand[1],
-    }
-    halves = {
+    }  # fmt: skip
+    numbers |= {
         f"{claim}: {learner} {half.wrong}, noise per {half.decay}": (count, half.pairs)
         for claim in ("C1", "C2")
         for half in known.verdict(claim).halves
@@ -290,65 +263,63 @@ def _finding(known: study.Published) -> list[Line]:
     }
     medians = known.verdict("W9").numbers.get("medians", {})
     numbers |= {f"C9: {name}, median reduction of the cost": one for name, one in medians.items()}
-    for claim, names in MEDIANS.items():
-        there = known.verdict(claim).numbers
-        numbers |= {text: there[name] for name, text in names.items() if name in there}
+    for text, (claim, name) in MEDIANS.items():
+        if name in (there := known.verdict(claim).numbers):
+            numbers[text] = there[name]
+    layouts = {
+        "theta_c by hand: layouts solved": one.by_hand,
+        "theta_c by hand: layouts where it costs less than any run of ES and GES": one.better,
+    }
     return [
-        *(_count(group, name, *count) for name, count in (runs | halves).items()),
-        *(_count(group, name, yes, of, "layouts") for name, (yes, of) in layouts.items()),
-        *(Line(group, name, value=float(number)) for name, number in numbers.items()),
+        *(_line(group, *each) for each in numbers.items()),
+        *(_line(group, *each, "layouts") for each in layouts.items()),
     ]
 
 
-MEDIANS: Mapping[str, Mapping[str, str]] = {  # numbers of verdicts, in words
-    "C1": {"DES_median": "C1: DES, last training cost over the frozen arm's",
-           "RDES_median": "C1: RDES, last training cost over the frozen arm's"},
-    "C5": {"path": "C5: distance of trajectories [m]", "cost": "C5: difference of costs",
-           "theta": "C5: largest difference of a component of theta"},
-    "C6": {"told": "C6: error with theta as an input", "alone": "C6: error without theta"},
-    "C7": {"inside_large": "C7: states of RDES deep in an obstacle, training",
-           "eval_inside_large": "C7: states of RDES deep in an obstacle, without noise"},
-}  # fmt: skip
+MEDIANS = {  # numbers of verdicts, by what they are
+    "C1: DES, last training cost over the frozen arm's": ("C1", "DES_median"),
+    "C1: RDES, last training cost over the frozen arm's": ("C1", "RDES_median"),
+    "C5: distance of trajectories [m]": ("C5", "path"),
+    "C5: difference of costs": ("C5", "cost"),
+    "C5: largest difference of a component of theta": ("C5", "theta"),
+    "C6: error with theta as an input": ("C6", "told"),
+    "C6: error without theta": ("C6", "alone"),
+    "C7: states of RDES deep in an obstacle, training": ("C7", "inside_large"),
+    "C7: states of RDES deep in an obstacle, without noise": ("C7", "eval_inside_large"),
+}
 
 
 def _variants() -> list[Line]:
     """How many variants change a verdict of the paper's claims."""
     every = gather("published", variants=True)
     judged = robustness.variant_changes(every.runs, every.paths)
-    changed = judged[judged.changes.astype(bool)]
-    of, group = judged.variant.nunique(), "Variants"
-    return [
-        _count(group, "variants that change a verdict", changed.variant.nunique(), of, "variants"),
-        _count(
-            group,
-            f"variants that change one with p < {SURE}",
-            changed[changed.p < SURE].variant.nunique(),
-            of,
-            "variants",
-        ),
-    ]
+    changed, of = judged[judged.changes.astype(bool)], judged.variant.nunique()
+    counts = {
+        "variants that change a verdict": changed.variant.nunique(),
+        f"variants that change one with p < {SURE}": changed[changed.p < SURE].variant.nunique(),
+    }
+    return [_line("Variants", name, (n, of), "variants") for name, n in counts.items()]
 
 
 def _drawn() -> list[Line]:
-    """The claims and questions in drawn layouts."""
+    """The claims and questions in drawn layouts; a claim has its row of `population.shares`."""
     known, group = population.load(), "Drawn layouts"
-    shares = known.shares.set_index("claim")
-    lines = _answered(group, POPULATION, POPULATION.table(), known)
-    return [_share(one, shares.loc[one.name]) if one.name in shares.index else one for one in lines]
-
-
-def _share(line: Line, share: pd.Series) -> Line:
-    """A claim in drawn layouts, with its row of `population.shares`."""
-    text = f"{line.name}: the share of the layouts in which it holds"
-    return replace(line, text=text, value=share.share, low=share.low, high=share.high)
+    shares, answers = known.shares.set_index("claim"), POPULATION.judge(known)
+    lines = [_answer(group, one, answers[one.name]) for one in POPULATION.questions]
+    for i, one in enumerate(lines):
+        if one.name in shares.index:
+            text = f"{one.name}: the share of the layouts in which it holds"
+            value, low, high = shares.loc[one.name, ["share", "low", "high"]]
+            lines[i] = replace(one, text=text, value=value, low=low, high=high)
+    return lines
 
 
 def _made_again() -> list[Line]:
     """The share of the stopped runs that live when they are made again."""
     ends = interventions.ends(INTERVENTIONS.table())
     return [
-        _estimate("Stopped runs made again", f"share that lives: {arm}, {where}",
-                  interventions.live(ends[ends.part == part], arm))
+        _line("Stopped runs made again", f"share that lives: {arm}, {where}",
+              interventions.live(ends[ends.part == part], arm))
         for part, where in {"six": "layouts A to F", "drawn": "drawn layouts"}.items()
         for arm in interventions.ARMS
     ]  # fmt: skip
@@ -360,11 +331,7 @@ def _advice() -> list[Line]:
     for entry, rows in remedies.advice(REMEDIES.table()).groupby("entry", sort=False):
         lines.append(Line("Remedies", f"advice on {entry}", outcome=f"try {rows.word.iloc[0]}"))
         lines += [
-            _estimate("Remedies", f"{entry}: share of the possible gain, {row.part[6:]}", row.gain)
+            _line("Remedies", f"{entry}: share of the possible gain, {row.part[6:]}", row.gain)
             for row in rows.itertuples()
         ]
     return lines
-
-
-def _numbers(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {**row, **{name: float(row[name]) for name in ("value", "low", "high") if name in row}}

@@ -1,9 +1,8 @@
 """Prose with numbers, and the library's own source, as Markdown that every notebook shows."""
 
-import ast
 import inspect
 import re
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
 from textwrap import dedent
 from typing import Any
@@ -86,49 +85,22 @@ def source(shown: Any, title: str = "") -> None:
 
 
 def listing(shown: Any) -> str:
-    """The file in which a name is defined, and its definition there, in Markdown.
+    """The file in which a function or class is defined, and its definition there, in Markdown.
 
     Args:
-        shown: a function or class, or "module:name" of what has no name of its own: a constant,
-            or a function that only exists compiled.
-
-    Raises:
-        NameError: the module defines no such name.
+        shown: it, or "module:name" of one that the library compiles.
     """
     if isinstance(shown, str):
         module, _, name = shown.partition(":")
-    else:
-        module, name = shown.__module__, shown.__qualname__
-    spec = find_spec(module)
-    assert spec
-    assert spec.origin
-    text = Path(spec.origin).read_text("utf-8")
-    first, last = _extent(ast.parse(text), name)
-    lines = dedent("\n".join(text.splitlines()[first - 1 : last]))
-    return f"`{Path(spec.origin).relative_to(ROOT).as_posix()}`\n\n```python\n{lines}\n```"
+        shown = getattr(import_module(module), name)
+    shown = getattr(shown, "py_func", shown)
+    path = Path(inspect.getfile(inspect.unwrap(shown))).relative_to(ROOT).as_posix()
+    return f"`{path}`\n\n```python\n{dedent(inspect.getsource(shown)).rstrip()}\n```"
 
 
 def folded(text: str, title: str) -> str:
     """Markdown behind a title that opens it."""
     return f"<details><summary>{title}</summary>\n\n{text}\n\n</details>"
-
-
-def _extent(tree: Any, name: str) -> tuple[int, int]:
-    """The first and the last line of a definition, decorators included."""
-    for outer in name.split("."):
-        tree = next((one for one in tree.body if outer in _defined(one)), None)
-        if tree is None:
-            raise NameError(f"{name} is not defined there")
-    decorators = getattr(tree, "decorator_list", [])
-    return min(one.lineno for one in (tree, *decorators)), tree.end_lineno
-
-
-def _defined(statement: ast.stmt) -> set[str]:
-    """The names that a statement gives a meaning."""
-    if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-        return {statement.name}
-    names = (one for one in ast.walk(statement) if isinstance(one, ast.Name))
-    return {one.id for one in names if isinstance(one.ctx, ast.Store)}
 
 
 def _show(text: str) -> None:

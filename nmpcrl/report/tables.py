@@ -5,13 +5,13 @@ from collections.abc import Iterable, Mapping
 from html import escape
 from math import isnan
 
+import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.bench.learners import ratio
 from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.paper_claims import CLAIMS, WIDER_THAN
-from nmpcrl.claims.rule import Claim, anew
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN
+from nmpcrl.claims.rule import Claim, Paths, anew
 from nmpcrl.claims.verdict import (
     NOT,
     PARTLY,
@@ -22,7 +22,7 @@ from nmpcrl.claims.verdict import (
     Verdict,
 )
 from nmpcrl.report.cited import cited
-from nmpcrl.report.text import SURE, departure_link
+from nmpcrl.report.text import departure_link
 from nmpcrl.studies.investigation import WORDS as INVESTIGATED
 from nmpcrl.studies.investigation import Answer, Question
 from nmpcrl.study.departures import DEPARTURES
@@ -35,6 +35,10 @@ BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
     CLAIMS["C8"].words[NOT]: "verdict-not-applicable",  # refutes nothing: no colour of a no
 }
 PUBLISHED = "published"  # whose numbers a table shows, if nothing else is said
+SHORT = {  # claims in the heads of columns, in HTML
+    name: one.short.replace(r"$\theta_\mathrm{init}$", "θ<sub>init</sub>")
+    for name, one in (BY_RUNS | WIDER_CLAIMS).items()
+}
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
 
 
@@ -84,18 +88,6 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     return shown(pd.DataFrame.from_dict(rows, "index"), scope, escape=False)
 
 
-def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
-    """One row a claim: its outcome overall, in each layout, and with each decay of the noise."""
-    rows = {
-        f"<strong>{v.claim}</strong>": {"all": _word(v.outcome)}
-        | {name: _word(outcome) for name, outcome in v.by_layout.items()}
-        | {f"per {name}": _word(outcome) for name, outcome in v.by_decay.items()}
-        for v in verdicts
-        if v.by_layout
-    }
-    return shown(pd.DataFrame.from_dict(rows, "index").fillna(""), caption, escape=False)
-
-
 def assumption_table(assumptions: Iterable[Assumption]) -> str:
     """One row an assumption: which theorem makes it, and what is run."""
     rows = {
@@ -104,29 +96,6 @@ def assumption_table(assumptions: Iterable[Assumption]) -> str:
         for a in assumptions
     }
     return shown(pd.DataFrame.from_dict(rows, "index"))
-
-
-TIMES = {  # columns of `time_learners` with one number each, and what one of their units is
-    "solves": ("solves", 1),
-    "ms_per_step": ("ms per step", 1),
-    "ms_per_solve": ("ms per solve", 1),
-    "ms_per_fit": ("ms per fit", 1),
-    "ms_per_rest": ("ms per rest", 1),
-    "hours": ("run [s]", 3600),
-    "hours_paper": ("paper [h]", 1),
-}
-
-
-def timing_table(timings: pd.DataFrame) -> pd.DataFrame:
-    """One row a solver and learner: Table II, with each ratio to ES and its interval.
-
-    Args:
-        timings: of `time_learners`.
-    """
-    shown = timings.set_index(["solver", "learner"])
-    columns = {name: (one * shown[of]).map("{:.3g}".format) for of, (name, one) in TIMES.items()}
-    columns["ratio"] = [str(ratio(timings, *name)) for name in shown.index]
-    return pd.DataFrame(columns).replace("nan", "–")
 
 
 def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -> str:
@@ -156,20 +125,45 @@ def _share_of(name: str, yes: int, of: int) -> str:
     return f"{yes} of {of} {name}" + (f": {rate(yes, of):.0%}" if of else "")
 
 
-def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
-    """One row a claim: its verdict, and what changes it, by the letter of our assumption.
+def verdict_map(judged: pd.DataFrame) -> str:
+    """The rows of `robustness_map`, a column a claim: its outcome and the share of yes.
+
+    An arrow comes from the outcome that a row changes.
+    """
+    before = judged.base.map(WORDS).add(" → ").where(judged.changes.astype(bool), "")
+    shares = judged.share.map(" {:.0%}".format, na_action="ignore").fillna("")
+    cells = before + judged.outcome.map(_word) + shares
+    rows = judged.assign(cell=cells).set_index(["departure", "variant", "claim"])
+    by_claim = rows.cell.unstack(sort=False).fillna("").rename_axis(["letter", "changed"])
+    by_claim.columns = [f"{name}<br>{SHORT[name]}" for name in by_claim]
+    return shown(by_claim, escape=False)
+
+
+def other_thresholds(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
+    """Each claim's share of yes at other thresholds, and between which its outcome is the same."""
+    rows = {}
+    for name, claim in BY_RUNS.items():
+        values, own = claim.measure(runs, paths), claim.threshold
+        around = {f"{times:g} times": claim.nothing + times * (own - claim.nothing)
+                  for times in (0.5, 1.0, 2.0)}  # fmt: skip
+        shares = claim.at_borders(values, around.values()).share.map("{:.0%}".format)
+        low, high = same_outcome(claim.at_borders(values, np.sort([*claim.borders, own])), own)
+        rows[name] = {"number": claim.label, "threshold": f"{own:.3g}"}
+        rows[name] |= dict(zip(around, shares, strict=True))
+        rows[name] |= {"the same from": f"{low:.2g}", "to": f"{high:.2g}"}
+    return pd.DataFrame.from_dict(rows, "index")
+
+
+def same_outcome(curve: pd.DataFrame, border: float) -> tuple[float, float]:
+    """Between which borders, around one of them, the outcome stays what it is there.
 
     Args:
-        verdicts: of `rule.judge`.
-        changed: rows of `robustness_map`; a star marks those that are more than chance, by `SURE`.
+        curve: of `RunClaim.at_borders`, in ascending order.
+        border: one of them.
     """
-    names = changed.variant.where(~(changed.p < SURE), changed.variant + "*")
-    rows = {}
-    for v in verdicts:
-        mine = names[changed.claim == v.claim].groupby(changed.departure, sort=False).agg(", ".join)
-        by = [f"{letter or 'no assumption'}: {each}" for letter, each in mine.items()]
-        rows[v.claim] = {"claim": v.statement, "verdict": v.words, "changed by": "; ".join(by)}
-    return shown(pd.DataFrame.from_dict(rows, "index"))
+    stretch = curve.outcome.ne(curve.outcome.shift()).cumsum()
+    same = curve.border[stretch == stretch[curve.border.sub(border).abs().idxmin()]]
+    return same.min(), same.max()
 
 
 def departure(letter: str) -> str:

@@ -15,15 +15,11 @@ from matplotlib.colors import to_hex
 
 from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.analysis.extrapolation import Outcome
-from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.imitation import imitate
-from nmpcrl.analysis.suite import Judgement
 from nmpcrl.analysis.trap import Stand
 from nmpcrl.analysis.two_state import Chain
 from nmpcrl.claims import published, thresholds
-from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.published import Evidence
-from nmpcrl.claims.robustness import robustness_map
 from nmpcrl.claims.verdict import Assumption
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.report import figures
@@ -31,24 +27,18 @@ from nmpcrl.report import worlds as report
 from nmpcrl.report.drawn import at_the_gap
 from nmpcrl.report.figures import (
     claims,
-    expected_sarsa,
-    ges,
+    controller,
     layouts,
-    plans,
-    population,
-    rdes,
+    learners,
     remedies,
     results,
-    sensitivity,
     speed,
     style,
-    trap,
     trials,
     worlds,
 )
 from nmpcrl.report.figures.run import run_page
 from nmpcrl.report.trace import trace
-from nmpcrl.studies import other_problems
 from nmpcrl.studies import population as drawn
 from nmpcrl.studies import remedies as advice
 from nmpcrl.studies import worlds as changing
@@ -117,45 +107,41 @@ def predicted() -> object:
     es = known.main[known.main.learner == "ES"].reset_index(drop=True)
     tuned, judged = drawn.succeeds(parts.get_group("tune")), drawn.succeeds(known.main)
     scores = drawn.predictor_scores(known.layouts, tuned, judged)
-    return population.predictors(scores, es, at_the_gap(known).closes, "It tells")
+    return layouts.predictors(scores, es, at_the_gap(known).closes, "It tells")
 
 
-JUDGED = [Judgement(100.0, cost, cost < 100, 5, 0.1) for cost in (95.0, 150.0)]
 LAYOUTS = dict.fromkeys("ABCDEF", 0.3)
 MANY = pd.DataFrame({"episode": range(9), "ratio": 0.01})
 RUN = Experiment(**SMALL)
 FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is called
-    plans.closed_loop: lambda draw: draw(paper.task("A"), *loop()),
-    plans.receding_horizon: lambda draw: draw(paper.task("A"), *loop()),
-    plans.action_values: lambda draw: draw(ANGLE[:2], ANGLE, np.ones((5, 2)), 0.9, ANGLE[:2]),
-    plans.theta_effects: lambda draw: draw(
+    controller.closed_loop: lambda draw: draw(paper.task("A"), *loop()),
+    controller.receding_horizon: lambda draw: draw(paper.task("A"), *loop()),
+    controller.action_values: lambda draw: draw(ANGLE[:2], ANGLE, np.ones((5, 2)), 0.9, ANGLE[:2]),
+    controller.theta_effects: lambda draw: draw(
         paper.task("A"), shifted(0.0),
         {name: {"×¼": shifted(0.1), "×4": shifted(i / 9)} for i, name in enumerate(style.MEANINGS)},
     ),
-    plans.printed_box: lambda draw: draw(paper.task("A"), shifted(0.0), shifted(0.5), wall=3.0),
-    plans.penalty_gap: lambda draw: draw(paper.task("A"), GRID, np.array([3, 1, 2, np.inf, 2])),
-    sensitivity.one_variable: lambda draw: draw(ANGLE, ANGLE**2, at=0.0, slope=-2.0),
-    sensitivity.gradient_errors: lambda draw: draw(10.0 ** ANGLE, ANGLE**2 + 0.1, ANGLE**2 + 0.01),
-    sensitivity.shares_closed: lambda draw: draw(GRID, 2 * GRID, 0.4),
-    sensitivity.kink: lambda draw: draw(ANGLE, np.abs(ANGLE), 0.001, (-1.0, 1.0)),
-    expected_sarsa.theta_paths: lambda draw: draw(runs("ES")),
-    expected_sarsa.overshoot: lambda draw: draw(runs("ES", "GES"), ("ES", "GES")),
-    expected_sarsa.two_costs: lambda draw: draw(runs("ES", "frozen")),
-    rdes.literal_and_gated: lambda draw: draw(
+    controller.penalty_gap: lambda draw: draw(paper.task("A"), GRID, np.r_[3, 1, 2, np.inf, 2]),
+    controller.one_variable: lambda draw: draw(ANGLE, ANGLE**2, at=0.0, slope=-2.0),
+    controller.shares_closed: lambda draw: draw(GRID, 2 * GRID, 0.4),
+    controller.kink: lambda draw: draw(ANGLE, np.abs(ANGLE), 0.001, (-1.0, 1.0)),
+    learners.theta_paths: lambda draw: draw(runs("ES")),
+    learners.overshoot: lambda draw: draw(runs("ES", "GES"), ("ES", "GES")),
+    learners.two_costs: lambda draw: draw(runs("ES", "frozen")),
+    learners.literal_and_gated: lambda draw: draw(
         *(run(Experiment("RDES", gated=gated, **SMALL)) for gated in (False, True))
     ),
-    rdes.online: lambda draw: draw(runs("DES", "RDES")),
-    rdes.held_out_errors: lambda draw: draw(imitate(one, fits=5) for one in runs("ES").values()),
-    rdes.interventions: lambda draw: draw(
-        {name: {how: outcome(how == "none") for how in rdes.WATCHED} for name in "AB"}, "It ends"
+    learners.online: lambda draw: draw(runs("DES", "RDES")),
+    learners.held_out_errors: lambda draw: draw(
+        imitate(one, fits=5) for one in runs("ES").values()
     ),
-    ges.on_the_chain: lambda draw: draw(Chain(), 0.1, (0.1, 1.0, 4.0), updates=50),
-    ges.corrections: lambda draw: draw(runs("ES", "GES")),
-    ges.curvatures: lambda draw: draw(
-        tuple(dropped_curvature(one, samples=10) for one in list(runs("ES", "GES").values())[2:3])
+    learners.interventions: lambda draw: draw(
+        {name: {how: outcome(how == "none") for how in learners.WATCHED} for name in "AB"},
+        "It ends",
     ),
-    ges.parts_of_tdc: lambda draw: draw(
-        {name: summary_of(Experiment("TDC")) for name in ges.PARTS}
+    learners.on_the_chain: lambda draw: draw(Chain(), 0.1, (0.1, 1.0, 4.0), updates=50),
+    learners.parts_of_tdc: lambda draw: draw(
+        {name: summary_of(Experiment("TDC")) for name in learners.PARTS}
     ),
     results.learning_curves: lambda draw: draw(
         made(), ("DES", "RDES"), "A", thresholds.divergence, "diverged"
@@ -173,27 +159,18 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
     ),
     claims.measured: lambda draw: draw(whole().main, verdict("C6")),
     claims.times: lambda draw: draw(whole().timings, verdict("C3"), "RDES"),
-    claims.same_policy: lambda draw: draw(whole().main, verdict("C5")),
-    claims.violations: lambda draw: draw(whole().main, verdict("C7")),
     claims.theorem: lambda draw: draw(
         [Assumption("one", "", holds=False)], verdict("C8"), run(Experiment("GES", **SMALL)), MANY
     ),
     claims.learners: lambda draw: draw(whole().main, "ES ends lowest"),
     layouts.layouts: lambda draw: draw(dict.fromkeys(paper.LAYOUTS, WAY)),
-    layouts.borders: lambda draw: draw(
-        {name: one.measure(made().runs, made().paths) for name, one in BY_RUNS.items()}, "made up"
-    ),
-    layouts.verdict_map: lambda draw: draw(
-        robustness_map(made().runs, made().paths), "Some change", "made up"
-    ),
-    population.shares: lambda draw: draw(*[population_of().shares] * 2, "It holds"),
-    population.predictors: lambda draw: predicted(),
-    trap.trap: lambda draw: draw(paper.task("E"), STANDS, (0, 1, 3), "It stands"),
-    trap.cliffs: lambda draw: draw(
+    layouts.shares: lambda draw: draw(*[population_of().shares] * 2, "It holds"),
+    layouts.predictors: lambda draw: predicted(),
+    layouts.trap: lambda draw: draw(paper.task("E"), STANDS, (0, 1, 3), "It stands"),
+    layouts.cliffs: lambda draw: draw(
         GRID, dict.fromkeys(LAYOUTS, (4000 + GRID, 4100 + GRID)), LAYOUTS, "Up"
     ),
     remedies.gains: lambda draw: draw(advice.advice(advice.REMEDIES.table()), "It gains"),
-    remedies.by_budget: lambda draw: draw([5, 10], {"ES": JUDGED, "grid": JUDGED}),
     remedies.trajectories: lambda draw: draw(
         {name: dict.fromkeys(remedies.WAYS, WAY) | {"init": FAILS} for name in paper.LAYOUTS}
     ),
@@ -210,17 +187,13 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
     trials.learned: lambda draw: draw(
         GRID, 1.0, {"before": ANGLE, "after": 0 * ANGLE}, ("mass [kg]", "height [m]")
     ),
-    trials.known: lambda draw: draw(
-        {"ES": np.c_[GRID, GRID], "LSTD-Q": np.c_[GRID, ANGLE]}, np.ones(2),
-        other_problems.runs(other_problems.OTHER_PROBLEMS.table()),
-    ),
+    trials.known: lambda draw: draw({"ES": np.c_[GRID, ANGLE]}, np.ones(2)),
     speed.row_prices: lambda draw: draw(ANGLE, dict.fromkeys((10.0, 1.0, 0.1), ANGLE**2 + 1),
                                         dict.fromkeys((10.0, 1.0, 0.1), ANGLE**2)),
     speed.sparsity: lambda draw: draw(np.eye(9), np.eye(5), step=2),
     speed.convergence: lambda draw: draw(
         traced(), dict.fromkeys(("cold", "shifted", "same state"), traced()), 1e-8
     ),
-    speed.learning_steps: lambda draw: draw(whole().timings),
     speed.saving: lambda draw: draw(whole().timings, {"ipopt MX": 4.0, "rebuilt": 40.0}),
     run_page: lambda draw: draw(run(RUN), run(frozen_arm(RUN))),
 }  # fmt: skip
@@ -283,7 +256,7 @@ def test_a_learner_is_told_from_others_without_colour_and_seen_on_white():
 
 @pytest.mark.parametrize("kind", ["svg", "png"])
 def test_the_same_figure_gives_the_same_bytes(kind):
-    one, other = (FIGURES[sensitivity.kink](sensitivity.kink) for _ in range(2))
+    one, other = (FIGURES[controller.kink](controller.kink) for _ in range(2))
     assert one.written(kind) == other.written(kind)
 
 

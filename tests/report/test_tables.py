@@ -10,6 +10,8 @@ from builders import evidence_of as made_up
 
 from nmpcrl.analysis.encounters import Contacts, Encounters
 from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.robustness import robustness_map
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.report import agents, remedies, tables, text, timing, worlds
 from nmpcrl.report.drawn import at_the_gap, improve_by_gap, share_table
@@ -41,7 +43,7 @@ def cells(table: str) -> list[list[str]]:
 # Claims
 
 
-def test_a_verdict_shows_its_share_and_interval_and_each_layout_and_decay_in_words():
+def test_a_verdict_shows_its_share_and_interval():
     known, own = verdict(NOT), verdict(PARTLY, share=0.75, interval=(0.5, 0.875))
     shown = tables.verdict_table([known], "<All of it.>", [own])
     header, row = cells(shown)
@@ -49,23 +51,20 @@ def test_a_verdict_shows_its_share_and_interval_and_each_layout_and_decay_in_wor
     assert row == ["C1", "a < b & c.", NOT, f"{PARTLY}|75% [50%, 88%]"]
     assert cells(tables.verdict_table([own], ""))[1][2] == row[3]
     assert "<caption>&lt;All of it.&gt;</caption>" in shown
-    parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
-    table = tables.layout_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
-    assert cells(table) == [
-        ["", "all", "A", "B", "per step"],
-        ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
-    ]
-    for outcome in (PARTLY, REPRODUCED, NOT, UNDECIDABLE):
-        assert f'<span class="{tables.BADGES[outcome]}">{tables.WORDS[outcome]}</span>' in table
 
 
-def test_what_changes_a_verdict_is_named_by_departure_with_a_star_where_it_is_sure():
-    rows = [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)]
-    changed = pd.DataFrame(rows, columns=["departure", "variant", "claim", "p"])
-    row = cells(tables.dependence([verdict(PARTLY)], changed))[1]
-    by = "B: layout E*, layout F; no assumption: N = 5"
-    assert row == ["C1", "a < b & c.", PARTLY, by]
-    assert cells(tables.dependence([verdict(NOT)], changed[:0]))[1][-1] == ""
+def test_the_map_has_an_arrow_for_every_change_and_an_outcome_is_the_same_up_to_where_it_turns():
+    found = made_up(lambda e: {"end": 1.2} if e.layout == "A" else {"swing": 0.1})
+    judged = robustness_map(found.runs, found.paths)
+    shown = cells(tables.verdict_map(judged))
+    assert sum(" → " in cell for row in shown for cell in row) == judged.changes.sum() > 0
+    table = tables.other_thresholds(found.runs, found.paths)
+    assert [*table.index] == [*BY_RUNS]
+    assert table.threshold["C9"] == "0.01"
+    outcome = ["no", "no", "yes", "yes", "yes", "no", "yes"]
+    curve = pd.DataFrame({"border": np.arange(1.0, 8.0), "outcome": outcome})
+    stays = [tables.same_outcome(curve, border) for border in (4.0, 1.0, 7.0)]
+    assert stays == [(3.0, 5.0), (1.0, 2.0), (7.0, 7.0)]
 
 
 def test_a_drawn_claim_has_count_interval_outcome_and_what_was_expected():
@@ -212,9 +211,6 @@ def test_a_ratio_of_times_has_its_interval_and_is_one_half_where_slow_solves_are
     interval = f"{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
     assert f">{interval}</data>" in shown
     assert 'title="step of RDES in steps of ES, with ipopt: the published measurement"' in shown
-    table = tables.timing_table(timings)
-    assert table.ratio["ipopt", "RDES"] == interval
-    assert table["ms per fit"]["ipopt", "ES"] == "–"
     with pytest.raises(KeyError):
         timing.to_es(timings, "scipy", "RDES")
     timings.loc[timings.learner == "ES", "ms_per_solve"] *= 0.8

@@ -1,37 +1,28 @@
 """What figures are made of: maps, axes over episodes, curves of runs, logarithmic axes, legends."""
 
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.colors import to_rgb
 from matplotlib.container import BarContainer
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
-from nmpcrl.report.figures.style import (
-    BAND,
-    DECAY_TITLES,
-    INK,
-    LOOKS,
-    WIDTH,
-    Drawn,
-    hatched,
-    subplots,
-)
+from nmpcrl.report.figures.style import BAND, DECAY_TITLES, INK, LOOKS, Drawn, subplots
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
 LEAST = 1.5  # high over low of an axis that has hardly anything to show
 FEW = 20  # high over low of an axis on which powers of ten are too few
-MAPS = 2  # side by side
 
 
 def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
@@ -52,38 +43,37 @@ def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
 
 
 def panels(
-    names: Sequence[str], row: float, rest: float, columns: int = MAPS, **options: Any
-) -> tuple[Drawn, dict[str, Axes], Any]:
-    """A panel for each name, row by row.
+    names: Sequence[str],
+    row: float,
+    rest: float,
+    columns: int = 2,
+    labels: tuple[str, str] = ("x [m]", "y [m]"),
+    **share: bool,
+) -> tuple[Drawn, dict[str, Axes]]:
+    """A panel for each name, row by row, with its name above; maps, all to one scale.
 
     Args:
         names: of what is drawn.
         row: height of a row [inches].
         rest: height of what stands above and below the rows [inches].
         columns: at most.
-        options: of `subplots`.
+        labels: of the axes below and on the left.
+        share: `sharex` or `sharey`, if panels have scales of their own.
 
     Returns:
-        The figure, the panel of each name, and all panels as rows and columns.
+        The figure, and the panel of each name.
     """
     columns = min(columns, len(names))
-    rows = -(-len(names) // columns)
-    figure, grid = subplots(rows, columns, row * rows + rest, squeeze=False, **options)
-    for axes in grid.flat[len(names) :]:
-        axes.set_visible(False)
-    return figure, dict(zip(names, grid.flat, strict=False)), grid
-
-
-def maps(names: Sequence[str], row: float, rest: float) -> tuple[Drawn, dict[str, Axes]]:
-    """A map for each layout, all to one scale, with its name above; as `panels`."""
-    figure, by_layout, grid = panels(names, row, rest, sharex=True, sharey=True)
-    for name, axes in by_layout.items():
-        axes.set_title(name)
+    high = -(-len(names) // columns)
+    options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False} | share
+    figure, grid = subplots(high, columns, row * high + rest, **options)
+    for name, axes in zip_longest(names, grid.flat):
+        axes.set(title=name, visible=name is not None)
     for axes in grid[-1]:
-        axes.set_xlabel("x [m]")
+        axes.set_xlabel(labels[0])
     for axes in grid[:, 0]:
-        axes.set_ylabel("y [m]")
-    return figure, by_layout
+        axes.set_ylabel(labels[1])
+    return figure, dict(zip(names, grid.flat, strict=False))
 
 
 def over_episodes(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
@@ -125,14 +115,13 @@ def by_decay(
                 each_episode(panel, measure(records), lw=1.2, **LOOKS[learner].line)
         over_episodes(panel, decay)
     axes[0, 0].set_ylabel(ylabel)
-    legend(figure, learners)
     return figure, axes[0]
 
 
 def plain(axis: Axis) -> None:
     """Write the ticks of a logarithmic axis as 0.5, 1, 2 and not as powers of ten."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter("{x:g}")
     axis.set_minor_locator(NullLocator())
 
 
@@ -181,18 +170,51 @@ def jitter(count: int, width: float) -> Vector:
     return np.linspace(-width, width, count) if count > 1 else np.zeros(count)
 
 
-def below(figure: Drawn, handles: Sequence[Any], labels: Sequence[str] | None = None) -> None:
-    """A legend below all panels, in as many columns as there is room for."""
-    names = [str(handle.get_label()) for handle in handles] if labels is None else [*labels]
-    plain_names = (re.sub(r"[${}_^]", "", re.sub(r"\\[a-zA-Z]+", "x", name)) for name in names)
-    widest = 4.8 + 0.56 * max(map(len, plain_names))  # in letters of 10 points, with its line
-    columns = max(1, int((7.2 * WIDTH + 2) / widest))  # nothing stands after the last
-    figure.legend(handles, names, loc="outside lower left", ncols=columns, alignment="left")
+def entries(learners: Iterable[str]) -> list[Line2D]:
+    """One entry of a legend a learner."""
+    return [Line2D([], [], label=name, **LOOKS[name].line) for name in learners]
 
 
-def legend(figure: Drawn, learners: Iterable[str], *others: Line2D) -> None:
-    """One entry a learner, below all panels."""
-    below(figure, [*(Line2D([], [], label=name, **LOOKS[name].line) for name in learners), *others])
+def rows(axes: Axes, names: Sequence[str]) -> None:
+    """Name rows at 0, 1, 2, the first on top."""
+    axes.set_yticks(range(len(names)), names, fontsize="small")
+    axes.set_ylim(len(names) - 0.4, -0.6)
+
+
+def strips(axes: Axes, values: pd.DataFrame, placed: Callable[[pd.Series], Any]) -> list[Line2D]:
+    """Every run's number above its layout: learners side by side, the second decay hollow.
+
+    A short line is the median of a learner and decay.
+
+    Args:
+        axes: of one panel.
+        values: a column a learner; its index has layout and decay.
+        placed: where numbers are drawn.
+
+    Returns:
+        The entries of a legend.
+    """
+    layouts, decays = values.index.unique("layout"), values.index.unique("decay")
+    columns = [(name, decay) for name in values for decay in decays]
+    apart = min(0.19, 0.85 / len(columns))
+    for column, (name, decay) in enumerate(columns):
+        look = LOOKS.get(name, LOOKS["GES"])
+        face = look.color if decay == decays[0] else "white"
+        for i, layout in enumerate(layouts):
+            known = placed(values[name].xs((layout, decay), level=("layout", "decay")).dropna())
+            x = i + apart * (column - (len(columns) - 1) / 2)
+            dots = look.dots(mfc=face, markersize=3, mew=0.7)
+            axes.plot(x + jitter(known.size, 0.37 * apart), known, **dots)
+            if known.size:  # of a half that is infinite and one that is not, the middle is neither
+                middle = np.quantile(known, 0.5, method="higher")
+                axes.hlines(middle, x - 0.47 * apart, x + 0.47 * apart, color=INK)
+    axes.set_xlabel("layout")
+    axes.set_xticks(range(len(layouts)), layouts)
+    kinds = [Line2D([], [], label=n, **LOOKS.get(n, LOOKS["GES"]).dots()) for n in values]
+    for decay, face in zip(decays, (LOOKS["frozen"].color, "white"), strict=False):
+        dots = LOOKS["frozen"].dots(marker="o", mfc=face)
+        kinds.append(Line2D([], [], label=f"noise per {decay}", **dots))
+    return kinds
 
 
 def interval(axes: Axes, y: float, estimate: Any, **look: Any) -> None:
@@ -205,10 +227,12 @@ def interval(axes: Axes, y: float, estimate: Any, **look: Any) -> None:
 def stacked(
     axes: Axes, parts: pd.DataFrame, looks: Mapping[str, tuple[str, str]], height: float
 ) -> dict[str, BarContainer]:
-    """A bar a row of `parts`, made of its columns from left to right."""
+    """A bar a row of `parts`, made of its columns, with colour and hatching, from left to right."""
     bars, left = {}, np.zeros(len(parts))
-    for name, look in looks.items():
-        bars[name] = axes.barh(parts.index, parts[name], height, left, label=name, **hatched(*look))
+    for name, (color, hatch) in looks.items():
+        edge = "0.5" if min(to_rgb(color)) > 0.8 else "white"  # a pale part has an outline
+        look = {"facecolor": color, "hatch": hatch, "edgecolor": edge, "linewidth": 0.5}
+        bars[name] = axes.barh(parts.index, parts[name], height, left, label=name, **look)
         left += parts[name].to_numpy()
     return bars
 

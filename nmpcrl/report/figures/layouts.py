@@ -1,25 +1,27 @@
-"""Figures of what verdicts depend on: the layouts, the thresholds, and a map of all variants."""
+"""Figures of what a layout decides: gaps, where claims hold, and the trap that theta_c closes."""
 
-from collections.abc import Mapping
-from itertools import pairwise
-from textwrap import fill
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Rectangle
 
-from nmpcrl import Matrix
-from nmpcrl.claims.by_runs import Values
-from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.analysis.trap import Stand, stretch
+from nmpcrl.claims.thresholds import improves
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.control import Task
-from nmpcrl.report.figures.axes import FEW, draw_task, maps, panels, plain
+from nmpcrl.report.drawn import label
+from nmpcrl.report.figures.axes import draw_task, interval, over_episodes, panels, plain, rows
 from nmpcrl.report.figures.style import (
-    AT_ONE,
+    BAND,
+    INK,
     LIMIT,
+    OCHRE,
     TEAL,
     WINE,
     Drawn,
@@ -27,22 +29,47 @@ from nmpcrl.report.figures.style import (
     subplots,
     titled,
 )
-from nmpcrl.report.tables import WORDS
+from nmpcrl.studies.difficulty import OPEN, PILOT
+from nmpcrl.studies.population import EXPECTED, STANDING
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import gaps
 
-OPEN, CLOSED = TEAL, WINE  # a gap
 NARROW = 1.0  # a gap that is drawn leaves less than this [m]
-FILLS = {  # with the colour of the word; the darker, the more is left of the claim
-    REPRODUCED: ("#1a6b3c", "white"),
-    PARTLY: ("#e0b050", "black"),
-    NOT: ("#f6d5d2", "black"),
-    UNDECIDABLE: ("white", "0.45"),
+LOOK: Mapping[Outcome, dict[str, Any]] = {  # of an outcome
+    REPRODUCED: {"color": TEAL, "marker": "D", "markersize": 5.5},
+    PARTLY: {"color": INK, "marker": "o", "markersize": 5.5},
+    NOT: {"color": WINE, "marker": "X", "markersize": 5.5},
+    UNDECIDABLE: {"color": "0.5", "marker": "s", "markersize": 5.5},
 }
-SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
-SHORT = WORDS | {PARTLY: "part"}  # in a cell half an inch wide
-LETTERS = -2.4  # where the letters of the departures stand, in widths of a cell
-FOLD = 10  # characters of a line above a column
+NAMED: dict[str, Any] = {  # the share of A to F
+    "marker": "|", "color": OCHRE, "markersize": 11, "markeredgewidth": 2, "linestyle": "",
+    "label": "A to F",
+}  # fmt: skip
+LABELS = {
+    "closest": "clearance [BARN]",
+    "visibility": "visibility [BARN]",
+    "dispersion": "dispersion [BARN]",
+    "dimension": "width [BARN]",
+    "tortuosity": "tortuosity [BARN]",
+    "cost": "initial cost",
+    "slope": r"the cost's slope in $\theta_c$",
+    "overshoot": r"initial $\alpha\Vert\phi\Vert^2$",
+    "closes": r"$\theta_c$ that closes a gap",
+}
+ROW = 0.23  # height of a row [inches]
+SHOWN = 0.03  # theta_c below which a mark stands at the edge
+ENDS = ((True, TEAL, "o", 3, "ES improves"), (False, WINE, "X", 4, "it does not"))
+MOMENTS = (("#0072B2", "-"), (OCHRE, "--"), (WINE, "-."))  # of a trajectory and its clearances
+BEST: dict[str, Any] = {"color": TEAL, "linestyle": "-"}
+FIRST: dict[str, Any] = {"color": WINE, "linestyle": "--"}
+LINES: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {  # label, and fields of a `Stand`
+    "value": ("where it ends", {
+        "forever": FIRST | {"label": r"$\ell / (1 - \gamma)$"}, "value": BEST | {"label": "V"},
+    }),
+    "delta": ("|δ|", {"delta": {"color": INK}}),
+    "theta_c": (r"$\theta_c$", {"theta_c": {"color": INK}}),
+    "cost": ("cost without noise", {"cost": {"color": INK}}),
+}  # fmt: skip
 
 
 @page
@@ -52,7 +79,7 @@ def layouts(rollouts: Mapping[str, Matrix]) -> Drawn:
     Args:
         rollouts: states of the rollout without noise, shape (K + 1, n), by layout.
     """
-    figure, by_name = maps(list(rollouts), 2.0, 0.4)
+    figure, by_name = panels(list(rollouts), 2.0, 0.4)
     margin, closing = paper.task().margin, 0
     for name, states in rollouts.items():
         axes, task = by_name[name], paper.task(name)
@@ -66,10 +93,8 @@ def layouts(rollouts: Mapping[str, Matrix]) -> Drawn:
                 _gap(axes, task, sides, shut=width <= 0)
         kind = "closing" if narrowest <= 0 else "open"
         axes.set(title=f"{name}: {kind}, {narrowest:+.2f} m", ylim=(-3.0, 6.0))
-    count = f"{closing} of {len(rollouts)} layouts"
-    return titled(
-        figure, rf"In {count}, a gap of the first rollout is closed at $\theta_c$ = {margin:g}"
-    )
+    title = f"In {closing} of {len(rollouts)} layouts, a gap of the first rollout is closed"
+    return titled(figure, rf"{title} at $\theta_c$ = {margin:g}")
 
 
 def _gap(axes: Axes, task: Task, sides: tuple[int, int], *, shut: bool) -> None:
@@ -81,107 +106,137 @@ def _gap(axes: Axes, task: Task, sides: tuple[int, int], *, shut: bool) -> None:
     else:  # a wall: left, bottom, right, top are -1 to -4
         axis = (-sides[1] - 1) % 2
         other[axis] = (task.lower if sides[1] >= -2 else task.upper)[axis]
-    color, line = (CLOSED, (0, (1, 0.6))) if shut else (OPEN, "-")
+    color, line = (WINE, (0, (1, 0.6))) if shut else (TEAL, "-")
     axes.plot(*np.transpose([one, other]), color=color, linestyle=line, linewidth=2.2)
 
 
 @page
-def borders(values: Mapping[str, Values], mark: str) -> Drawn:
-    """What would become of each claim with other thresholds than its own.
+def shares(found: pd.DataFrame, six: pd.DataFrame, finding: str) -> Drawn:
+    """One row a claim: in which share of the layouts it holds, beside A to F and what was expected.
 
     Args:
-        values: of each claim's measure, over the main table.
-        mark: where the runs come from.
+        found: of `population.shares`, of the drawn layouts.
+        six: the same of A to F.
+        finding: the title.
     """
-    figure, by_claim, grid = panels(list(values), 1.7, 0.6, sharey=True)
-    for claim, measured in values.items():
-        axes, asked = by_claim[claim], BY_RUNS[claim]
-        first, last = asked.borders[[0, -1]]
-        curve = asked.at_borders(measured, np.sort([*asked.borders, asked.threshold]))
-        axes.plot(curve.border, curve.share, color="black")
-        axes.fill_between(curve.border, curve.low, curve.high, color="0.85", linewidth=0)
-        axes.axvline(asked.threshold, **LIMIT)
-        for share in (NEARLY_NONE, NEARLY_ALL):
-            axes.axhline(share, **AT_ONE)
-        axes.set(xscale="log" if first > 0 else "linear", ylim=(-0.03, 1.03))
-        if 0 < last < FEW * first:
-            plain(axes.xaxis)
-        axes.set_xlabel(asked.label, fontsize="small")
-        low, high = same_verdict(curve, asked.threshold)
-        axes.set_title(f"{claim}: same {low:.2g} to {high:.2g}", fontsize="small")
-    for row in grid:
-        row[0].set_ylabel("share of yes")
-    stay = sum(BY_RUNS[claim].steady(measured) for claim, measured in values.items())
-    finding = f"{stay} of {len(values)} verdicts stay with a border half as far, and twice as far"
-    return titled(figure, finding, mark)
-
-
-def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:
-    """Between which thresholds, around a claim's own, its verdict stays what it is.
-
-    nan where nothing is known.
-
-    Args:
-        curve: of `RunClaim.at_borders`, in ascending order.
-        border: one of them.
-    """
-    if curve.empty:
-        return np.nan, np.nan
-    own = int(np.argmin(np.abs(curve.border - border)))
-    other = np.flatnonzero(curve.outcome != curve.outcome.iloc[own])
-    first = max(other[other < own], default=-1) + 1
-    last = min(other[other > own], default=len(curve)) - 1
-    return float(curve.border.iloc[first]), float(curve.border.iloc[last])
+    figure, axes = subplots(height=ROW * len(found) + 1.6)
+    for y, row in enumerate(found.itertuples()):
+        expected = EXPECTED[str(row.claim)]
+        width = expected.high - expected.low
+        axes.add_patch(Rectangle((expected.low, y - 0.32), width, 0.64, **BAND))
+        interval(axes, y, Estimate(row.share, row.low, row.high), **LOOK[row.outcome])
+        named = six.share[six.claim == row.claim]
+        axes.plot(named, [y] * len(named), **NAMED)
+    rows(axes, [label(str(name)) for name in found.claim])
+    axes.set(xlim=(-0.02, 1.02), xlabel="share of layouts")
+    axes.xaxis.set_major_formatter("{x:.0%}")
+    outcomes = [one for one in LOOK if (found.outcome == one).any()]
+    handles: list[Any] = [Line2D([], [], label=str(one), **LOOK[one]) for one in outcomes]
+    handles += [Line2D([], [], **NAMED), Rectangle((0, 0), 1, 1, label="expected", **BAND)]
+    return titled(figure, finding, legend=handles)
 
 
 @page
-def verdict_map(judged: pd.DataFrame, finding: str, mark: str) -> Drawn:
-    """What becomes of each claim in each row, framed where it is not what it is compared with.
+def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series, finding: str) -> Drawn:
+    """Where ES ends against where a gap closes, and how well each measure tells that beforehand.
 
     Args:
-        judged: of `robustness_map`.
+        scores: of `predictors.predictor_scores`.
+        runs: of ES, of `rows.table`.
+        closes: theta_c at which the first gap of the first trajectory closes, a run's layout each.
         finding: the title.
-        mark: where the runs come from.
     """
-    claims = {name: i for i, name in enumerate(judged.claim.unique())}
-    letters = dict(zip(judged.variant, judged.departure, strict=True))
-    steps = [1.0 + 0.4 * (one != other) for one, other in pairwise(letters.values())]
-    height = dict(zip(letters, np.cumsum([0.0, *steps]), strict=True))
-    last = max(height.values())
-    figure, axes = subplots(height=0.22 * last + 1.5)
-    for cell in judged.to_dict("records"):
-        _cell(axes, claims[cell["claim"]], height[cell["variant"]], cell)
-    look: dict[str, Any] = {"va": "center", "fontsize": "small"}
-    for row, y in height.items():
-        axes.text(-0.1, y, _with_symbols(row), ha="right", **look)
-    for letter in dict.fromkeys(letters.values()):
-        top = min(y for row, y in height.items() if letters[row] == letter)
-        axes.text(LETTERS, top, letter, ha="left", **look)
-    look["va"] = "bottom"
-    axes.text(LETTERS, -0.8, "letter", ha="left", **look)
-    for claim, i in claims.items():
-        head = f"{claim}\n{fill(BY_RUNS[claim].short, FOLD, break_long_words=False)}"
-        axes.text(i + 0.5, -0.8, head, ha="center", **look)
-    axes.set(xlim=(LETTERS, len(claims)), ylim=(last + 0.7, -5.2))
-    axes.set_axis_off()
-    return titled(figure, finding, mark)
+    figure, (ends, areas) = subplots(2, 1, ROW * len(scores) + 3.9)
+    better = improves(runs)
+    for well, color, mark, size, name in ENDS:
+        there = better == well
+        values = runs.theta_8[there].clip(lower=SHOWN)
+        ends.plot(closes[there], values, mark, color=color, markersize=size, label=name)
+    shut = np.geomspace(SHOWN, OPEN, 50)
+    ends.plot(shut, shut, **LIMIT, label="the gap is closed above")
+    ends.set(yscale="log", ylabel=r"$\theta_c$ after learning", xlim=(0, None))
+    ends.set_xlabel(r"$\theta_c$ at which the first gap closes")
+    plain(ends.yaxis)
+    order = [*scores.auc.map(lambda one: one.value).sort_values(ascending=False).index]
+    areas.axvline(0.5, **LIMIT)
+    looks = {PILOT: {"color": TEAL, "marker": "D"}}
+    for y, name in enumerate(order):
+        interval(areas, y, scores.auc[name], **looks.get(name, {"color": INK}))
+    rows(areas, [LABELS[name] for name in order])
+    areas.set_xlabel("area under the ROC curve")
+    areas.set_title("how well it tells beforehand")
+    return titled(figure, finding, legend=ends)
 
 
-def _with_symbols(row: str) -> str:
-    for word, symbol in SYMBOLS.items():
-        row = row.replace(word, symbol)
-    return row
+@page
+def cliffs(
+    grid: Vector,
+    costs: Mapping[str, tuple[Vector, Vector]],
+    best: Mapping[str, float],
+    finding: str,
+) -> Drawn:
+    """Cost over theta_c with all else best, and with all else as it was, a panel a layout.
+
+    Args:
+        grid: of theta_c.
+        costs: on the grid, by layout: with the best theta, and with theta_init.
+        best: theta_c of the best theta, by layout.
+        finding: the title.
+    """
+    labels = r"$\theta_c$ (no unit)", "cost [thousands]"
+    figure, by_layout = panels(list(costs), 1.9, 0.6, labels=labels, sharey=False)
+    for layout, panel in by_layout.items():
+        along_best, along_init = costs[layout]
+        panel.plot(grid, along_init / 1000, label=r"all else as $\theta_\mathrm{init}$", **FIRST)
+        panel.plot(grid, along_best / 1000, label="all else best", **BEST)
+        panel.axvline(best[layout], **LIMIT)
+        panel.set(title=f"layout {layout}", ylim=(0, None))
+    return titled(figure, finding, legend=panel)
 
 
-def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
-    """Colour, word and share of yes; framed, and with what it was before, if it changes."""
-    fill_color, ink = FILLS[cell["outcome"]]
-    place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
-    axes.add_patch(Rectangle(place, *size, facecolor=fill_color, edgecolor="0.5", linewidth=0.5))
-    text = SHORT[cell["outcome"]]
-    if cell["changes"]:
-        text = f"{SHORT[cell['base']]}→{text}"
-        axes.add_patch(Rectangle(place, *size, fill=False, edgecolor="black", linewidth=1.8))
-    elif 0 < cell["share"] < 1:
-        text += f" {cell['share']:.0%}"
-    axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize="small")
+@page
+def trap(task: Task, stands: Sequence[Stand], moments: Sequence[int], finding: str) -> Drawn:
+    """One run: where the robot goes at three moments, and what value, TD error and cost do.
+
+    Args:
+        task: what the robot moves in.
+        stands: of `analysis.trap.stands`.
+        moments: which three of them the map shows, the last two of a robot that stands.
+        finding: the title.
+    """
+    figure = Drawn(6.2)
+    by_name = figure.subplot_mosaic(
+        [["map", "map"], ["value", "delta"], ["theta_c", "cost"]], height_ratios=(2.2, 1, 1)
+    )
+    _map(by_name["map"], task, [stands[k] for k in moments])
+    there = stretch(stands, STANDING)
+    along = [one.episode for one in stands]
+    away = np.array([not one.arrived for one in stands])
+    for name, (ylabel, fields) in LINES.items():
+        axes = by_name[name]
+        if there:
+            axes.axvspan(there[0].episode, there[-1].episode, **BAND)
+        for field, look in fields.items():
+            values = np.array([getattr(one, field) for one in stands])
+            axes.plot(along, np.where(away | (name != "value"), values, np.nan), **look)
+        over_episodes(axes)
+        axes.set(xlim=(0, along[-1]), ylabel=ylabel)
+        axes.set_ylim(bottom=0)
+    by_name["value"].set_ylim(top=1.5 * by_name["value"].get_ylim()[1])
+    by_name["value"].legend(ncols=2, fontsize="small", loc="upper right")
+    by_name["value"].set_title("grey: the robot is stuck")
+    return titled(figure, finding)
+
+
+def _map(axes: Axes, task: Task, shown: Sequence[Stand]) -> None:
+    """The way of the robot at each moment, and what plans keep away from."""
+    draw_task(axes, task)
+    for one, (color, style) in zip(shown, MOMENTS, strict=True):
+        for x, y, clearance in np.transpose(task.discs):
+            radius = clearance / 2 * np.sqrt(1 + one.theta_c)
+            axes.add_patch(Circle((x, y), radius, fill=False, ec=color, ls=style, lw=0.9))
+        name = rf"episode {one.episode}, $\theta_c$ = {one.theta_c:.2f}"
+        axes.plot(*one.states[:, :2].T, color=color, linestyle=style, linewidth=2, label=name)
+        if not one.arrived:
+            axes.plot(*one.states[-1, :2], "X", color=color, markersize=8, mec="white")
+    axes.legend(loc="lower left", fontsize="small")

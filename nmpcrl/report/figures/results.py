@@ -7,23 +7,22 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, PercentFormatter
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism
 from nmpcrl.claims.published import Evidence
 from nmpcrl.report.figures.axes import (
     draw_task,
     each_episode,
-    legend,
-    maps,
+    entries,
     middle_half,
     over_episodes,
     panels,
     stacked,
+    strips,
 )
 from nmpcrl.report.figures.style import (
     BAND,
@@ -122,10 +121,10 @@ def learning_curves(
         row[0].set_ylabel(label)
     for axes in grid[-1]:
         axes.set_xlabel("episode")
-    legend(figure, learners)
     held = {name: measure(drawn.runs[drawn.runs.learner == name]) for name in pair}
     counts = [f"{one.sum()} of {len(one)} runs of {name}" for name, one in held.items()]
-    return titled(figure, f"In layout {layout}, {' and '.join(counts)} {word}", drawn.mark)
+    title = f"In layout {layout}, {' and '.join(counts)} {word}"
+    return titled(figure, title, drawn.mark, entries(learners))
 
 
 def _costs(axes: Axes, along: Vector, costs: Any, learner: str) -> None:
@@ -170,16 +169,14 @@ def controls(found: Evidence, layout: str) -> Drawn:
         axis.axhline(plant.upper[i], **LIMIT)
         axis.set_ylabel(plant.action_names[i])
     axes[-1].set_xlabel("time [s]")
-    legend(figure, SHOWN)
     learned = [one.actions for e, one in drawn.summaries.items() if e.learner != "frozen"]
     outside = sum(metrics.out_of_bounds(one, plant.lower, plant.upper).sum() for one in learned)
     used = np.median([np.nanmax(np.abs(one) / plant.upper, axis=0) for one in learned], axis=0)
-    return titled(
-        figure,
+    title = (
         f"RDES and GES use up to {used[0]:.0%} of the speed and {used[1]:.0%} of the turn rate"
-        f" allowed; {outside} inputs leave their bounds",
-        drawn.mark,
+        f" allowed; {outside} inputs leave their bounds"
     )
+    return titled(figure, title, drawn.mark, entries(SHOWN))
 
 
 @page
@@ -189,7 +186,7 @@ def trajectories(found: Evidence) -> Drawn:
     A run that had to be stopped left no policy: it is counted, and not drawn.
     """
     drawn = part(found, SHOWN)
-    figure, by_layout = maps(drawn.summaries.values_of("layout"), 1.95, 1.4)
+    figure, by_layout = panels(drawn.summaries.values_of("layout"), 1.95, 1.4)
     for layout, axes in by_layout.items():
         draw_task(axes, paper.task(layout), labels=False)
         runs = _finished(drawn).summaries.select(layout=layout)
@@ -199,11 +196,11 @@ def trajectories(found: Evidence) -> Drawn:
             axes.plot(*known[:, :2].T, **look.line, linewidth=0.8)
             axes.plot(*known[-1, :2], **look.dots(markersize=3.5))
         axes.set_ylim(-3, 6)
-    legend(figure, SHOWN)
     learned = drawn.runs[drawn.runs.learner != "frozen"]
     arrived = (learned.ending == Ending.ARRIVED) & (learned.stopped == Stopped.FINISHED)
     of = f"{arrived.sum()} of {len(learned)} runs of RDES and GES"
-    return titled(figure, f"After {of} the robot reaches the target", drawn.mark)
+    title = f"After {of} the robot reaches the target"
+    return titled(figure, title, drawn.mark, entries(SHOWN))
 
 
 def _finished(found: Evidence) -> Evidence:
@@ -253,7 +250,7 @@ def by_layout(
     title: str,
     seen: tuple[float, float],
 ) -> Drawn:
-    """A share of every run, layout by layout and learner by learner, with interquartile means.
+    """A share of every run, layout by layout and learner by learner.
 
     Args:
         found: the runs.
@@ -263,34 +260,14 @@ def by_layout(
         title: the finding.
         seen: the lowest and the highest that is drawn.
     """
-    runs, layouts = found.runs, list(found.runs.layout.unique())
-    figure, in_layout, grid = panels(layouts, 2.3, 0.9, 3, sharey=True)
-    for layout, axes in in_layout.items():
-        for x, learner in enumerate(learners):
-            here = (runs.layout == layout) & (runs.learner == learner) & values.notna()
-            _strip(
-                axes, x, LOOKS[learner].dots(markersize=3.5), runs[here], values[here].clip(*seen)
-            )
-        axes.axhline(0, **LIMIT)
-        axes.set_title(layout)
-        axes.set_xticks(range(len(learners)), learners, rotation=90, fontsize="small")
-        axes.set_xlim(-0.6, len(learners) - 0.4)
-    for row in grid:
-        row[0].set_ylabel(label)
-    grid[0, 0].set_ylim(*seen)
-    grid[0, 0].yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
-    return titled(figure, title, found.mark)
-
-
-def _strip(axes: Axes, x: int, look: dict[str, Any], runs: pd.DataFrame, values: pd.Series) -> None:
-    """The runs of a learner, hollow if noise decays per episode; their middle, its interval."""
-    for decay, shift, face in (("step", -0.16, look["color"]), ("episode", 0.16, "none")):
-        some = values[runs.decay == decay]
-        axes.plot(x + shift + np.linspace(-0.1, 0.1, len(some)), some, mfc=face, **look)
-    if len(values):
-        middle = interquartile_mean(values.to_numpy(), list(runs.layout))
-        axes.plot([x - 0.35, x + 0.35], [middle.value] * 2, color="black", linewidth=1.6)
-        axes.plot([x, x], [middle.low, middle.high], color="black", linewidth=1.0)
+    figure, axes = subplots()
+    cells = [found.runs[name] for name in ("layout", "decay", "seed", "learner")]
+    each = pd.Series(values.to_numpy(), pd.MultiIndex.from_arrays(cells)).unstack(sort=False)
+    kinds = strips(axes, each[[*learners]], lambda drawn: drawn.clip(*seen))
+    axes.axhline(0, **LIMIT)
+    axes.set(ylabel=label, ylim=seen)
+    axes.yaxis.set_major_formatter("{x:.0%}")
+    return titled(figure, title, found.mark, kinds)
 
 
 @page
@@ -314,8 +291,8 @@ def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: flo
         axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
     each_episode(axes[0, 0], solvers, **other)
     axes[0, 0].set(ylabel="largest difference in θ", yscale="log")
-    learners = dict.fromkeys(experiment.learner for experiment in perturbed)
-    legend(figure, learners, Line2D([], [], label="ES, riccati and Ipopt", **other))
+    learners = entries(dict.fromkeys(experiment.learner for experiment in perturbed))
+    by_solver = Line2D([], [], label="ES, riccati and Ipopt", **other)
     grown = sum(apart[-1] > start for apart in perturbed.values())
     title = f"A difference of {start:.0e} grows in {grown} of {len(perturbed)} runs"
-    return titled(figure, title)
+    return titled(figure, title, legend=[*learners, by_solver])

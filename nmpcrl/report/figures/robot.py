@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix
@@ -14,40 +14,34 @@ from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task
 from nmpcrl.report.figures.style import INK, PAGE, TEAL, WINE
 
-SIZE, DOTS = (6.4, 6.4), 100  # inches, and dots an inch
 MARGIN = 0.4  # around the box, in which the walls are seen [m]
 
 
 def frame(task: Task, states: Matrix) -> NDArray[np.uint8]:
-    """The map with the way so far, shape (640, 640, 3).
+    """The map with the way so far, the robot as large as it is and where it looks.
 
     Args:
         task: its obstacles, start, target and box.
         states: of the episode so far, shape (steps, 3).
+
+    Returns:
+        Shape (640, 640, 3).
     """
-    with rc_context({**PAGE, "figure.dpi": DOTS}):
-        figure = Figure(figsize=SIZE, layout="constrained")
+    with rc_context(PAGE):
+        figure = Figure(figsize=(6.4, 6.4), dpi=100, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)
         axes = figure.subplots()
         draw_task(axes, task)
-        (left, bottom), (right, top) = task.lower[:2], task.upper[:2]
-        axes.plot([left, right, right, left, left], [bottom, bottom, top, top, bottom], color=INK)
+        low, high = task.lower[:2], task.upper[:2]
+        axes.add_patch(Rectangle(low, *(high - low), fill=False, ec=INK, lw=1.6))
         axes.plot(states[:, 0], states[:, 1], color=TEAL)
-        _robot(axes, task, states[-1])
-        axes.set(xlim=(left - MARGIN, right + MARGIN), ylim=(bottom - MARGIN, top + MARGIN))
-        axes.set_title(f"after {len(states) - 1} steps, {_away(task, states[-1]):.2f} m to go")
+        place, heading, radius = states[-1, :2], states[-1, 2], task.robot_diameter / 2
+        axes.add_patch(Circle(place, radius, fc=WINE, ec=INK, lw=0.8, zorder=3))
+        ahead = place + radius * np.array([np.cos(heading), np.sin(heading)])
+        axes.plot(*np.transpose([place, ahead]), color="white", lw=2, zorder=4)
+        (left, bottom), (right, top) = low - MARGIN, high + MARGIN
+        away = np.linalg.norm(place - task.target[:2])
+        title = f"after {len(states) - 1} steps, {away:.2f} m to go"
+        axes.set(xlim=(left, right), ylim=(bottom, top), title=title)
         canvas.draw()
         return np.array(canvas.buffer_rgba())[:, :, :3]
-
-
-def _away(task: Task, state: Any) -> float:
-    return float(np.hypot(*(state - task.target)[:2]))
-
-
-def _robot(axes: Any, task: Task, state: Any) -> None:
-    """The robot as large as it is, and where it looks."""
-    x, y, heading = state
-    radius = task.robot_diameter / 2
-    axes.add_patch(Circle((x, y), radius, fc=WINE, ec=INK, lw=0.8, zorder=3))
-    ahead = radius * np.array([np.cos(heading), np.sin(heading)])
-    axes.plot([x, x + ahead[0]], [y, y + ahead[1]], color="white", lw=2, zorder=4)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from nmpcrl.analysis import metrics
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import draw_task, each_episode, logarithmic_if_wide, over_episodes
-from nmpcrl.report.figures.expected_sarsa import DASHES, largest_steps, thetas
+from nmpcrl.report.figures.learners import DASHES, largest_steps, thetas
 from nmpcrl.report.figures.style import (
     INK,
     LIMIT,

@@ -7,19 +7,17 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.bench.learners import PAPER_SOLVE
 from nmpcrl.bench.saving import saving as saving_of
-from nmpcrl.report.figures.axes import below, stacked
 from nmpcrl.report.figures.style import (
     AT_ONE,
     BAND,
     INK,
     LIMIT,
     LOOKS,
-    STEP_PARTS,
     TEAL,
     WINE,
     Drawn,
@@ -63,8 +61,8 @@ def row_prices(
     left.set(xlabel="$h$ (no unit)", ylabel=r"$W \sigma$ [cost]")
     right.set_title("its multiplier")
     right.set(xlabel="$h$ (no unit)", ylabel=r"$\lambda / W$ (no unit)")
-    below(figure, *right.get_legend_handles_labels())
-    return titled(figure, "The barrier rounds a kink off, and turns a step into a smooth price")
+    title = "The barrier rounds a kink off, and turns a step into a smooth price"
+    return titled(figure, title, legend=right)
 
 
 @page
@@ -128,33 +126,6 @@ def convergence(
 
 
 @page
-def learning_steps(timings: pd.DataFrame) -> Drawn:
-    """What a learning step is made of with the fastest and the paper's solver, a bar a learner.
-
-    Args:
-        timings: of `time_learners`.
-    """
-    figure, axes = subplots(1, 2, height=2.6, sharey=True)
-    shares = []
-    for panel, solver in zip(axes, ("riccati", "ipopt"), strict=True):
-        parts = _parts(timings[timings.solver == solver])
-        stacked(panel, parts, STEP_PARTS, 0.65)
-        panel.set_title(f"with {solver}")
-        panel.set_xlabel("a step [ms]")
-        shares.append(f"{parts.network['RDES'] / parts.loc['RDES'].sum():.0%} with {solver}")
-    axes[0].invert_yaxis()
-    below(figure, *axes[0].get_legend_handles_labels())
-    return titled(figure, f"Of a step of RDES the network takes {' and '.join(shares)}")
-
-
-def _parts(timings: pd.DataFrame) -> pd.DataFrame:
-    """Milliseconds of each part, a row a learner."""
-    mine = timings.set_index("learner")
-    columns = (mine.solves * mine.ms_per_solve, mine.ms_per_fit.fillna(0.0), mine.ms_per_rest)
-    return pd.DataFrame(dict(zip(STEP_PARTS, columns, strict=True)))
-
-
-@page
 def saving(timings: pd.DataFrame, others: Mapping[str, float]) -> Drawn:
     """Claim C3: a step of RDES over one of ES, against the time of one solve.
 
@@ -180,13 +151,9 @@ def saving(timings: pd.DataFrame, others: Mapping[str, float]) -> Drawn:
     text = f" break-even: {model.break_even:.1g} ms\n ({low:.1g} to {high:.1g})"
     place = {"xycoords": ("data", "axes fraction"), "va": "top", "fontsize": "small"}
     axes.annotate(text, (high, 0.97), **place)
-    axes.set(
-        xscale="log",
-        xlabel="time of a solve of RDES [ms]",
-        ylabel="step of RDES / step of ES (no unit)",
-    )
-    axes.set(ylim=(0, None))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set(xscale="log", xlabel="time of a solve of RDES [ms]", ylim=(0, None))
+    axes.set_ylabel("step of RDES / step of ES (no unit)")
+    axes.xaxis.set_major_formatter("{x:g}")
     return titled(figure, f"RDES saves time from a solve of about {model.break_even:.1g} ms on")
 
 

@@ -2,7 +2,7 @@
 
 import re
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from io import BytesIO
@@ -12,7 +12,8 @@ from typing import Any, ParamSpec
 import numpy as np
 from IPython.display import display
 from matplotlib import colormaps, rc_context
-from matplotlib.colors import to_hex, to_rgb
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 
@@ -84,20 +85,27 @@ def subplots(
     return figure, figure.subplots(rows, columns, **options)
 
 
-def titled(figure: Drawn, title: str, source: str = "") -> Drawn:
-    """The figure with its finding above, on as many lines as it takes, and its runs' source below.
+def titled(figure: Drawn, title: str, source: str = "", legend: Axes | Sequence[Any] = ()) -> Drawn:
+    """The figure with its finding above, on as many lines as it takes, and its legend below.
 
     Args:
-        figure: all panels, and the legend below them.
+        figure: all panels.
         title: the finding.
         source: where the runs come from; it heads the legend, if there is one.
+        legend: its handles, or a panel with all of them; in as many columns as there is room for.
     """
     unbroken = re.sub(r"\$.*?\$", lambda math: math[0].replace(" ", "{}"), title)
     figure.suptitle(unbroken, x=0.01, ha="left", wrap=True)
-    if figure.legends:
-        legend = figure.legends[0]
-        legend.set_title(fill(source, 78), prop=FontProperties(size="small"))
-        legend.get_title().set_color("0.35")
+    handles = legend.get_legend_handles_labels()[0] if isinstance(legend, Axes) else legend
+    if handles:
+        names = [str(one.get_label()) for one in handles]
+        plain = (re.sub(r"[${}_^]", "", re.sub(r"\\[a-zA-Z]+", "x", name)) for name in names)
+        widest = 4.8 + 0.56 * max(map(len, plain))  # in letters of 10 points, with its line
+        columns = max(1, int((7.2 * WIDTH + 2) / widest))  # nothing stands after the last
+        place = {"loc": "outside lower left", "alignment": "left"}
+        box = figure.legend(handles, names, ncols=columns, **place)
+        box.set_title(fill(source, 78), prop=FontProperties(size="small"))
+        box.get_title().set_color("0.35")
     elif source:
         figure.supxlabel(source, x=0.99, ha="right", fontsize="small", color="0.35", wrap=True)
     return figure
@@ -156,19 +164,8 @@ MEANINGS = {  # of paper.THETA_NAMES: the symbol, and a word or two
     "heading_f": (r"$\theta_{\varphi_f}$", "last heading"),
     "c": (r"$\theta_c$", "clearance"),
 }
-STEP_PARTS = {  # of a learning step: colour and hatching
-    "solves": ("0.2", ""),
-    "network": ("0.42", "//"),
-    "the rest": ("0.56", "..."),
-}
 
 
 def shades(count: int) -> list[str]:
     """Colours of lines that are in an order, from dark to pale; none is grey or lost on white."""
     return [to_hex(color) for color in colormaps["plasma"](np.linspace(0.0, 0.62, count))]
-
-
-def hatched(color: str, hatch: str) -> dict[str, Any]:
-    """How a part of a bar is drawn: a pale one has an outline."""
-    edge = "0.5" if min(to_rgb(color)) > 0.8 else "white"
-    return {"facecolor": color, "hatch": hatch, "edgecolor": edge, "linewidth": 0.5}

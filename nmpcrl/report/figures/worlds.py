@@ -5,20 +5,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle
-from matplotlib.ticker import PercentFormatter
 
-from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.analysis.statistics import interquartile_mean
-from nmpcrl.report.figures.axes import below, interval, over_episodes
+from nmpcrl.report.figures.axes import interval, over_episodes, rows
 from nmpcrl.report.figures.style import (
     BAND,
     INK,
     LIMIT,
     OCHRE,
-    QUIET,
     TEAL,
     WINE,
     Drawn,
@@ -30,7 +25,7 @@ from nmpcrl.report.worlds import nearest, signed
 from nmpcrl.studies.shifts import EVERY
 from nmpcrl.studies.worlds import VIEWS
 from nmpcrl.study import paper
-from nmpcrl.study.moving import CLEARANCE, PERIOD, TASK, Motion, centres
+from nmpcrl.study.moving import PERIOD, Motion
 
 OWN: Mapping[str, dict[str, Any]] = {  # policies of a wrong model
     "oracle": {"label": "true model", "color": INK, "marker": "s"},
@@ -57,7 +52,6 @@ SEEN: Mapping[str, dict[str, Any]] = {  # views of obstacles that move
 }
 DEAREST = 1.3  # in parts of theta_init's cost, that is drawn
 ROW = 0.55  # height of a fault [inches]
-AROUND = np.array([0.6, 2.0])  # of the map, beyond every way [m]
 
 
 @page
@@ -76,13 +70,12 @@ def models(saved: pd.DataFrame) -> Drawn:
             interval(axes, row, mean, **(look | {"label": None}))
         axes.plot([], [], linestyle="", **look)
     axes.axvline(0, **LIMIT)
-    axes.set_yticks(range(len(faults)), [FAULTS[fault] for fault in faults])
-    axes.set(xlabel=r"saved of the cost of $\theta_\mathrm{init}$", ylim=(len(faults) - 0.5, -0.5))
-    axes.xaxis.set_major_formatter(PercentFormatter(1, 0))
-    below(figure, axes.get_legend_handles_labels()[0])
+    rows(axes, [FAULTS[fault] for fault in faults])
+    axes.set_xlabel(r"saved of the cost of $\theta_\mathrm{init}$")
+    axes.xaxis.set_major_formatter("{x:.0%}")
     perfect, by_grid = (signed(-one) for one in saved[["oracle", "grid"]].median())
     changed = rf"The true model changes the cost by {perfect}, a grid over $\theta_c$ by {by_grid}"
-    return titled(figure, changed)
+    return titled(figure, changed, legend=axes)
 
 
 @page
@@ -103,75 +96,37 @@ def shifts(shares: Mapping[str, Sequence[Sequence[float]]], change: int) -> Draw
         quartiles = np.quantile(runs[arm], (0.25, 0.75), axis=0, method="inverted_cdf")
         axes.fill_between(episodes, *quartiles, color=look["color"], alpha=0.15, linewidth=0)
         axes.plot(episodes, np.median(runs[arm], axis=0), **look)
-    axes.yaxis.set_major_formatter(PercentFormatter(1, 0))
+    axes.yaxis.set_major_formatter("{x:.0%}")
     ylabel = r"cost over that of $\theta_\mathrm{init}$"
     axes.set(ylabel=ylabel, xlim=(0, episodes[-1]), ylim=(None, DEAREST))
     over_episodes(axes)
-    below(figure, axes.get_legend_handles_labels()[0])
     told, never = (np.median(runs[arm][:, -1]) for arm in ("ES told plain", "ES never plain"))
-    return titled(
-        figure,
+    title = (
         f"At the end ES costs {told:.0%} of replanning without learning if it knows of the"
-        f" change, and {never:.0%} if it does not",
+        f" change, and {never:.0%} if it does not"
     )
+    return titled(figure, title, legend=axes)
 
 
 @page
 def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Drawn:
-    """Maps of two views, and how near the robot comes to an obstacle with all three.
-
-    The maps show the moment at which a robot is deepest in an obstacle, or nearest to one.
+    """How near the robot comes to an obstacle in one scenario, with each view.
 
     Args:
         motions: of the obstacles.
         seen: by view, the episode in which the obstacles were seen so.
     """
-    figure = Drawn(4.6)
-    panels = figure.subplot_mosaic(
-        [["extrapolated", "frozen"], ["near", "near"]], height_ratios=(1.6, 1)
-    )
-    at = centres(motions, np.arange(paper.STEPS))
-    near = {view: nearest(one, motions) for view, one in seen.items()}
-    moment = int(np.argmin(near[min(near, key=lambda view: near[view].min())]))
-    ways = {view: one.states[: paper.STEPS, :2] for view, one in seen.items()}
-    every = np.vstack([*ways.values()])
-    low, high = every.min(axis=0) - AROUND, every.max(axis=0) + AROUND
-    for view in ("extrapolated", "frozen"):
-        panels[view].set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        panels[view].set(title=SEEN[view]["label"], xlabel="x [m]")
-        _map(panels[view], at, ways[view], min(moment, len(ways[view]) - 1), SEEN[view])
-    panels["extrapolated"].set_ylabel("y [m]")
-    panels["frozen"].tick_params(labelleft=False)
-    _distances(panels["near"], near, moment)
-    below(figure, panels["near"].get_legend_handles_labels()[0])
+    figure, axes = subplots(height=2.8)
+    for view, one in seen.items():
+        distances = nearest(one, motions)
+        axes.plot(PERIOD * np.arange(len(distances)), distances, **SEEN[view])
+    axes.margins(y=0.04)
+    axes.axhspan(min(0, axes.get_ylim()[0]), 0, **BAND)
+    axes.set(xlabel="time [s]", ylabel="to the nearest obstacle [m]")
+    axes.set(xlim=(0, PERIOD * (paper.STEPS - 1)), title="grey: inside an obstacle")
     known, extrapolated, frozen = (seen[view].contacts.inside for view in VIEWS)
-    return titled(
-        figure,
+    title = (
         f"States inside an obstacle: {known} if the motion is known, {extrapolated} if it is"
-        f" extrapolated, {frozen} if obstacles are taken as standing",
+        f" extrapolated, {frozen} if obstacles are taken as standing"
     )
-
-
-def _map(axes: Axes, at: Matrix, way: Matrix, moment: int, look: Mapping[str, Any]) -> None:
-    """Where everything is at one moment, and its way."""
-    radius = TASK.robot_diameter / 2
-    for j in range(at.shape[1]):
-        axes.plot(*at[:, j].T, color=QUIET, linewidth=0.8, zorder=1)
-        disc = Circle(at[moment, j], CLEARANCE / 2 - radius, fc="#CFCFCF", ec="#8A8A8A", zorder=2)
-        axes.add_patch(disc)
-    axes.plot(*way.T, linewidth=1.8, zorder=3, **look)
-    axes.add_patch(Circle(way[moment], radius, fc=look["color"], ec="white", lw=0.8, zorder=4))
-    axes.plot(*TASK.target[:2], "*", color=INK, ms=9, zorder=3)
-
-
-def _distances(axes: Axes, near: Mapping[str, Vector], moment: int) -> None:
-    """The distance to the nearest obstacle over time."""
-    seconds = PERIOD * np.arange(paper.STEPS)
-    axes.axhspan(min(one.min() for one in near.values()) - 0.1, 0, **BAND)
-    for view, distances in near.items():
-        points, now = np.c_[seconds[: len(distances)], distances], min(moment, len(distances) - 1)
-        axes.plot(*points.T, **SEEN[view])
-        axes.plot(*points[now], "o", color=SEEN[view]["color"], ms=5, clip_on=False)
-    axes.set(xlabel="time [s]", ylabel="to the nearest\nobstacle [m]", xlim=(0, seconds[-1]))
-    axes.set_title("grey: inside an obstacle")
-    axes.margins(y=0)
+    return titled(figure, title, legend=axes)

@@ -1,15 +1,16 @@
-"""Figures of the controller: plans among obstacles, action values, and what each theta does."""
+"""Figures of the controller: plans among obstacles, values, their slopes, and what theta does."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
+from scipy.spatial.distance import directed_hausdorff
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
-from nmpcrl.report.figures.axes import below, draw_task, maps
+from nmpcrl.report.figures.axes import draw_task, panels
 from nmpcrl.report.figures.style import (
     INK,
     MEANINGS,
@@ -32,11 +33,12 @@ def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Draw
     for i, plan in enumerate(plans):
         label = "plans" if i == 0 else None
         axes.plot(*plan.states[:, :2].T, ".-", color=WINE, lw=2.2, ms=5, label=label)
-    below(figure, *axes.get_legend_handles_labels())
     axes.margins(0.04)
     farthest = max(_length(plan.states) for plan in plans)
-    title = f"Plans of at most {farthest:.1f} m make a trajectory of"
-    return titled(figure, f"{title} {_length(rollout.states):.1f} m")
+    title = (
+        f"Plans of at most {farthest:.1f} m make a trajectory of {_length(rollout.states):.1f} m"
+    )
+    return titled(figure, title, legend=axes)
 
 
 @page
@@ -65,9 +67,10 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
     drawn = np.vstack([path[first : shown[-1] + horizon], *(plans[i].states[:, :2] for i in shown)])
     low, high = drawn.min(axis=0) - [0.3, 0.5], drawn.max(axis=0) + [0.3, 0.5]
     axes.set(xlabel="x [m]", ylabel="y [m]", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    below(figure, axes.get_legend_handles_labels()[0])
-    title = f"The end of a plan is up to {apart[farthest]:.2f} m from the place"
-    return titled(figure, f"{title} reached at that time")
+    title = (
+        f"The end of a plan is up to {apart[farthest]:.2f} m from the place reached at that time"
+    )
+    return titled(figure, title, legend=axes)
 
 
 @page
@@ -89,8 +92,8 @@ def action_values(
     axes.axhline(value, color=WINE, ls="--", lw=1.2, label="V(s)")
     axes.plot(policy[1], value, "D", color=WINE, ms=7, label="the policy's action")
     axes.set(xlabel="turn rate of the first action [rad/s]", ylabel="value [cost]")
-    below(figure, *axes.get_legend_handles_labels())
-    return titled(figure, "Q equals V at the policy's action, and is no lower elsewhere")
+    title = "Q equals V at the policy's action, and is no lower elsewhere"
+    return titled(figure, title, legend=axes)
 
 
 SIDES: tuple[tuple[str, str, float, str], ...] = (  # of two changes: colour, line, and its words
@@ -110,42 +113,24 @@ def theta_effects(
         middle: the closed loop of theta_init.
         others: name of the parameter -> how it was changed -> closed loop; two changes each.
     """
-    figure, by_name = maps(list(others), 1.5, 0.5)
-    moved = {}
-    for name, changes in others.items():
-        axes = by_name[name]
+    words = {" ".join(MEANINGS[name]): changes for name, changes in others.items()}
+    figure, by_words = panels(list(words), 1.5, 0.5)
+    for name, changes in words.items():
+        axes = by_words[name]
         draw_task(axes, task, labels=False)
         _trajectory(axes, middle, INK, ":")
         for (change, rollout), (color, line, x, side) in zip(changes.items(), SIDES, strict=True):
             _trajectory(axes, rollout, color, line)
             where: dict[str, Any] = {"transform": axes.transAxes, "fontsize": "small"}
             axes.text(x, 0.03, f"{change}: {rollout.cost:.0f}", color=color, ha=side, **where)
-        moved[name] = max(_apart(middle, rollout) for rollout in changes.values())
-        axes.set_title(" ".join(MEANINGS[name]))
     bottom, top = axes.get_ylim()
     axes.set_ylim(bottom - 1, top)
+    moved = {
+        name: max(_apart(middle, one) for one in each.values()) for name, each in others.items()
+    }
     first, second, *_ = sorted(moved, key=lambda name: -moved[name])
     most = " and ".join("{} ({})".format(*MEANINGS[name]) for name in (first, second))
     return titled(figure, f"{most} bend the trajectory most")
-
-
-@page
-def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Drawn:
-    """The trajectory in the box of departure A, and in the box as the paper prints it."""
-    figure, axes = subplots(height=3.2)
-    draw_task(axes, task)
-    axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
-    place = task.target[:2] + [0, task.near + 0.1]
-    axes.text(*place, f"$d_t$ = {task.near:g} m", ha="center", va="bottom")
-    axes.axvline(wall, color=WINE, lw=1)
-    words: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "color": WINE}
-    axes.text(wall, 1, f"wall at x = {wall:g} m ", ha="right", va="top", **words)
-    axes.plot(*repaired.states[:, :2].T, color=INK, ls=":", label="box [−3, 9]² (used here)")
-    axes.plot(*printed.states[:, :2].T, color=WINE, lw=2, label="box [−9, 3]² (as printed)")
-    axes.margins(0.04)
-    below(figure, *axes.get_legend_handles_labels())
-    nearest = np.linalg.norm(printed.states[:, :2] - task.target[:2], axis=1).min()
-    return titled(figure, f"In the printed box the robot comes no nearer than {nearest:.1f} m")
 
 
 @page
@@ -167,15 +152,75 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Drawn:
     above.axvline(keeps, color=WINE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
     above.axvline(begins, color=TEAL, ls="-.", label=f"the penalty begins at {begins:.3f} m")
     above.set(xlabel="distance to a centre [m]", ylabel="penalty of a step [cost]")
-    below(figure, above.get_legend_handles_labels()[0])
     order = np.argsort(theta_c)
     low.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
     low.axvline(task.margin, color=TEAL, ls="-.", lw=1)
     low.set(xlabel=r"$\theta_c$ (no unit)", ylabel="noise-free RL cost")
     best = theta_c[np.argmin(costs)]
-    return titled(
-        figure, f"The penalty begins too early; $\\theta_c$ = {best:.2f} has the lowest cost"
-    )
+    title = f"The penalty begins too early; $\\theta_c$ = {best:.2f} has the lowest cost"
+    return titled(figure, title, legend=above)
+
+
+@page
+def one_variable(theta: Vector, values: Vector, at: float, slope: float) -> Drawn:
+    """The value of min (x - theta)^2 subject to x >= 1, and its slope at one theta.
+
+    Args:
+        theta: where the problem was solved, shape (k,).
+        values: its optimal value there, shape (k,).
+        at: the theta of the tangent.
+        slope: dV/dtheta there.
+    """
+    figure, axes = subplots(height=3.0)
+    axes.plot(theta, values, color=INK, label=r"$V(\theta)$")
+    near = np.array([at - 0.6, at + 0.6])
+    axes.plot(near, np.interp(at, theta, values) + slope * (near - at), color=WINE, lw=2.2)
+    axes.plot(at, np.interp(at, theta, values), "D", color=WINE, label=f"slope {slope:g}")
+    axes.axvline(1, color=TEAL, ls="-.", lw=1, label="the constraint becomes inactive")
+    axes.set(xlabel=r"$\theta$ (no unit)", ylabel="optimal value (no unit)")
+    axes.legend()
+    return titled(figure, "The value falls until the constraint becomes inactive")
+
+
+@page
+def shares_closed(pulls: Vector, shares: Vector, taken: float) -> Drawn:
+    """How much of the TD error one update closes, against its alpha ||phi||^2.
+
+    Args:
+        pulls: alpha ||phi||^2, growing, shape (k,).
+        shares: of the TD error, found by solving again, shape (k,).
+        taken: the alpha ||phi||^2 of the update in the text.
+    """
+    figure, axes = subplots(height=3.2)
+    closed = np.interp(taken, pulls, shares)
+    axes.plot(pulls, shares, color=WINE, label="solved again with the new θ")
+    axes.plot(pulls, pulls, "--", color=TEAL, label="to first order")
+    axes.plot(taken, closed, "D", color=INK, label="the update in the text")
+    axes.axhline(1, color=INK, ls=":", lw=1)
+    axes.set(xlabel="α‖φ‖² (no unit)", ylabel="share of the TD error\nthat is closed (no unit)")
+    axes.legend()
+    return titled(figure, f"With α‖φ‖² = {taken:.2f} an update closes {closed:.2f} of the TD error")
+
+
+@page
+def kink(offsets: Vector, values: Vector, edge: float, slopes: tuple[float, float]) -> Drawn:
+    """V against theta_c where the start crosses an obstacle's boundary.
+
+    Args:
+        offsets: theta_c - edge, shape (k,).
+        values: V there, shape (k,).
+        edge: the theta_c that puts the start on the boundary.
+        slopes: dV/dtheta_c on the left and on the right of it.
+    """
+    figure, axes = subplots(height=3.3)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+    axes.plot(offsets, values - np.interp(0, offsets, values), "o", color=INK, ms=4, label="solved")
+    for slope, side, color, line in zip(slopes, (-1, 1), (TEAL, WINE), ("--", "-"), strict=True):
+        reach = np.array([0, side * np.abs(offsets).max()])
+        axes.plot(reach, slope * reach, line, color=color, label=f"slope {slope:.1f}")
+    axes.set(xlabel=rf"$\theta_c$ − {edge:.3f} (no unit)", ylabel="V − V at the boundary [cost]")
+    axes.legend()
+    return titled(figure, f"At the boundary the slope jumps by {slopes[1] - slopes[0]:.1f}")
 
 
 def _trajectory(axes: Any, rollout: Rollout, color: str, line: str) -> None:
@@ -192,6 +237,5 @@ def _length(states: Matrix) -> float:
 
 def _apart(a: Rollout, b: Rollout) -> float:
     """Largest distance [m] from a point of one trajectory to the nearest point of the other."""
-    first, second = a.states[:, None, :2], b.states[None, :, :2]
-    between = np.linalg.norm(first - second, axis=-1)
-    return float(max(between.min(axis=0).max(), between.min(axis=1).max()))
+    first, second = a.states[:, :2], b.states[:, :2]
+    return max(directed_hausdorff(*two)[0] for two in ((first, second), (second, first)))
