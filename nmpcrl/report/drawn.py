@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from nmpcrl.analysis.statistics import Estimate, count
+from nmpcrl.analysis.statistics import count
 from nmpcrl.claims.thresholds import improves
 from nmpcrl.studies.difficulty import OPEN, PILOT
-from nmpcrl.studies.population import CLAIMS, EXPECTED, IMPROVES, Drawn
+from nmpcrl.studies.population import CLAIMS, IMPROVES, Drawn
 from nmpcrl.study.drawn import name_of
 from nmpcrl.study.layouts import ARRIVED
 
@@ -37,21 +37,3 @@ def label(claim: str) -> str:
     """A claim of `EXPECTED`, and in few words what it says."""
     short = CLAIMS[claim].short.replace("\n", " ")
     return claim if claim in IMPROVES else f"{claim}: {short}"
-
-
-def share_table(shares: pd.DataFrame) -> pd.DataFrame:
-    """In how many of the drawn layouts each claim holds, with its interval of 95 %, a row a claim.
-
-    Args:
-        shares: of `population.shares`.
-    """
-    rows = {}
-    for row in shares.itertuples():
-        expected, share = EXPECTED[str(row.claim)], Estimate(row.share, row.low, row.high)
-        rows[row.claim] = {
-            "holds in": f"{row.holding} of {row.layouts}: {share:.0%}",
-            "weaker question": f"{row.weaker} of {row.layouts}",
-            "by the rule": row.outcome,
-            "expected": f"{expected.low:.0%} to {expected.high:.0%}",
-        }
-    return pd.DataFrame.from_dict(rows, "index")

@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.claims.assumptions import THEOREMS
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Claim, Paths, anew
 from nmpcrl.claims.verdict import (
@@ -17,7 +16,6 @@ from nmpcrl.claims.verdict import (
     PARTLY,
     REPRODUCED,
     UNDECIDABLE,
-    Assumption,
     Outcome,
     Verdict,
 )
@@ -86,16 +84,6 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
             words["runs of this page"] = _outcome(others[v.claim], "runs of this page")
         rows[f"<strong>{v.claim}</strong>"] = words
     return shown(pd.DataFrame.from_dict(rows, "index"), scope, escape=False)
-
-
-def assumption_table(assumptions: Iterable[Assumption]) -> str:
-    """One row an assumption: which theorem makes it, and what is run."""
-    rows = {
-        a.theorem: {name: "assumed" if name in a.by else "–" for name in THEOREMS}
-        | {"holds": "yes" if a.holds else "no", "here": a.here}
-        for a in assumptions
-    }
-    return shown(pd.DataFrame.from_dict(rows, "index"))
 
 
 def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -> str:

@@ -73,11 +73,3 @@ def moving(table: pd.DataFrame) -> pd.DataFrame:
             "clear": row["clear"],
         }
     return pd.DataFrame.from_dict(found, "index")
-
-
-def moving_table(found: pd.DataFrame) -> pd.DataFrame:
-    """`moving` as a page shows it."""
-    forms = {"cost": "{:.0%}", "saved": "{:.1%}", "solved": "{:.0%}", "inside": "{}",
-             "clear": "{:.0%}"}  # fmt: skip
-    shown = pd.DataFrame({name: found[name].map(form.format) for name, form in forms.items()})
-    return shown.rename(index=SEES, level=0).rename_axis(["plans with", "policy"])

@@ -260,7 +260,7 @@ def by_layout(
         title: the finding.
         seen: the lowest and the highest that is drawn.
     """
-    figure, axes = subplots()
+    figure, axes = subplots(height=3.9)
     cells = [found.runs[name] for name in ("layout", "decay", "seed", "learner")]
     each = pd.Series(values.to_numpy(), pd.MultiIndex.from_arrays(cells)).unstack(sort=False)
     kinds = strips(axes, each[[*learners]], lambda drawn: drawn.clip(*seen))

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
@@ -28,14 +27,6 @@ from nmpcrl.report.figures.style import (
 
 STARTS = {"cold": (INK, "o-"), "shifted": (TEAL, "s--"), "same state": (WINE, "D-.")}
 MARKERS = {"riccati": "o", "fatrop": "s", "ipopt": "^", "ipopt MX": "v", "rebuilt": "D"}
-PLACES = {  # of a name, from its point
-    "riccati": ((6, 4), "left"),
-    "fatrop": ((0, 8), "right"),
-    "ipopt": ((-2, -15), "center"),
-    "ipopt MX": ((6, 7), "left"),
-    "rebuilt": ((0, -15), "center"),
-}
-SMALL: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small"}
 
 
 @page
@@ -141,24 +132,17 @@ def saving(timings: pd.DataFrame, others: Mapping[str, float]) -> Drawn:
     axes.axhline(0.5, **LIMIT)
     axes.axhline(1.0, **AT_ONE)
     for row in timings[timings.learner == "RDES"].itertuples():
-        _mark(axes, row.solver, row.ms_per_solve, row.ratio, face=INK)
-    for solver, solve in others.items():
-        _mark(axes, solver, solve, model.ratio(solve), face="white")
-    axes.plot(theirs, 0.5, "*", color=INK, markersize=11, zorder=3)
-    axes.annotate("the paper", (theirs, 0.5), (0, -14), ha="center", **SMALL)
+        axes.plot(row.ms_per_solve, row.ratio, MARKERS[row.solver], color=INK, label=row.solver)
+    for solver, solve in others.items():  # whose learners were not timed: on the curve
+        axes.plot(solve, model.ratio(solve), MARKERS[solver], color=INK, mfc="white", label=solver)
+    axes.plot(theirs, 0.5, "*", color=INK, markersize=11, label="the paper")
     axes.axvspan(low, high, **BAND)
     axes.axvline(model.break_even, **AT_ONE, linestyle="--")
     text = f" break-even: {model.break_even:.1g} ms\n ({low:.1g} to {high:.1g})"
-    place = {"xycoords": ("data", "axes fraction"), "va": "top", "fontsize": "small"}
-    axes.annotate(text, (high, 0.97), **place)
+    place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "va": "top"}
+    axes.annotate(text, (high, 0.97), fontsize="small", **place)
     axes.set(xscale="log", xlabel="time of a solve of RDES [ms]", ylim=(0, None))
     axes.set_ylabel("step of RDES / step of ES (no unit)")
     axes.xaxis.set_major_formatter("{x:g}")
-    return titled(figure, f"RDES saves time from a solve of about {model.break_even:.1g} ms on")
-
-
-def _mark(axes: Axes, solver: str, solve: float, ratio: float, *, face: str) -> None:
-    """A solver's point; hollow where its learners were not timed and the curve is followed."""
-    axes.plot(solve, ratio, MARKERS[solver], color=INK, markerfacecolor=face, zorder=3)
-    place, side = PLACES[solver]
-    axes.annotate(solver, (solve, ratio), place, ha=side, **SMALL)
+    title = f"RDES saves time from a solve of about {model.break_even:.1g} ms on"
+    return titled(figure, title, legend=axes)

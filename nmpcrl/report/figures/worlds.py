@@ -122,7 +122,7 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Drawn:
         axes.plot(PERIOD * np.arange(len(distances)), distances, **SEEN[view])
     axes.margins(y=0.04)
     axes.axhspan(min(0, axes.get_ylim()[0]), 0, **BAND)
-    axes.set(xlabel="time [s]", ylabel="to the nearest obstacle [m]")
+    axes.set(xlabel="time [s]", ylabel="to the nearest\nobstacle [m]")
     axes.set(xlim=(0, PERIOD * (paper.STEPS - 1)), title="grey: inside an obstacle")
     known, extrapolated, frozen = (seen[view].contacts.inside for view in VIEWS)
     title = (
