@@ -73,29 +73,12 @@ class Line:
         return self.low <= other.high and other.low <= self.high
 
 
-VARIANTS = tuple((RUNS, part) for part in design.VARIANTS)
-MAIN, CONTROLS = (RUNS, design.MAIN_TABLE), (RUNS, "controls")
-
-
 def _parts(*every: Investigation) -> tuple[Part, ...]:
     return tuple((one.name, part) for one in every for part in one.parts)
 
 
-JUDGED = tuple(one for one in _parts(REMEDIES) if one[1] != "best")  # whose rows have J_best
-
-GROUPS: Mapping[str, tuple[Part, ...]] = {  # with the published parts that each rests on
-    "The paper's claims": (MAIN,),
-    "The paper's claims on time": ((TIMINGS, ""),),
-    "Our own claims": (MAIN, CONTROLS),
-    "The finding in numbers": (MAIN, (SEARCHES, "")),
-    "Variants": (MAIN, *VARIANTS),
-    "Drawn layouts": (*_parts(POPULATION, DIFFICULTY), MAIN, *VARIANTS, (SEARCHES, "")),
-    "Stopped runs made again": _parts(INTERVENTIONS),
-    "Remedies": JUDGED,
-    "SAC and TD3": (*_parts(SAC_AND_TD3), *JUDGED),
-    "Changing worlds": _parts(WORLDS),
-    "Other people's problems": _parts(OTHER_PROBLEMS),
-}
+MAIN = (RUNS, design.MAIN_TABLE)
+VARIANTS = tuple((RUNS, part) for part in design.VARIANTS)
 ASKED: Mapping[str, Investigation] = {  # groups of answers
     "Stopped runs made again": INTERVENTIONS,
     "Remedies": REMEDIES,
@@ -103,6 +86,16 @@ ASKED: Mapping[str, Investigation] = {  # groups of answers
     "Changing worlds": WORLDS,
     "Other people's problems": OTHER_PROBLEMS,
 }
+GROUPS: dict[str, tuple[Part, ...]] = {  # with the published parts that each rests on
+    "The paper's claims": (MAIN,),
+    "The paper's claims on time": ((TIMINGS, ""),),
+    "Our own claims": (MAIN, (RUNS, "controls")),
+    "The finding in numbers": (MAIN, (SEARCHES, "")),
+    "Variants": (MAIN, *VARIANTS),
+    "Drawn layouts": (*_parts(POPULATION, DIFFICULTY), MAIN, *VARIANTS, (SEARCHES, "")),
+} | {group: _parts(one) for group, one in ASKED.items()}
+GROUPS["Remedies"] = tuple(one for one in GROUPS["Remedies"] if one[1] != "best")  # have J_best
+GROUPS["SAC and TD3"] += GROUPS["Remedies"]
 
 
 def found() -> list[Line]:

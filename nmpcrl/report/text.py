@@ -26,7 +26,8 @@ def depends_on(verdicts: Iterable[Verdict], judged: pd.DataFrame) -> dict[str, t
         for field, letter in PARTS.items():
             if verdict.depends_on(field):
                 found[letter].add(verdict.claim)
-    for variant, claim in _changed(judged)[["variant", "claim"]].itertuples(index=False):
+    changed = judged[judged.changes.astype(bool)]  # without rows the column has no type of its own
+    for variant, claim in changed[["variant", "claim"]].itertuples(index=False):
         letter = design.VARIANTS[variant].departure
         if letter:
             found[letter].add(claim)
@@ -38,23 +39,11 @@ def judged(verdict: Verdict) -> str:
     return f"{audit_link(verdict.claim)} (*{verdict.statement.rstrip('.')}*): **{verdict.words}**."
 
 
-def outcomes(verdicts: Iterable[Verdict]) -> str:
-    """One item a claim, in Markdown: what it says, and what became of it."""
-    return "\n".join(
-        f"- {audit_link(v.claim)}. {v.statement} *{v.words.capitalize()}.*" for v in verdicts
-    )
-
-
 def audit_link(claim: str) -> str:
     """A link from a claim's name to its thresholds, counts and evidence, in Markdown."""
-    return f"[{claim}]({audit_place(claim)})"
-
-
-def audit_place(claim: str) -> str:
-    """Where that link leads."""
     name = WIDER_THAN.get(claim, claim)
     label = name.lower() if name in CLAIMS else "own"
-    return f"evidence.ipynb#evidence-{label}"
+    return f"[{claim}](evidence.ipynb#evidence-{label})"
 
 
 def departure_link(words: str, letter: str) -> str:
@@ -66,7 +55,3 @@ def listed(names: Iterable[object]) -> str:
     """ "a, b and c", or "none"."""
     *most, last = [str(name) for name in names] or ["none"]
     return f"{', '.join(most)} and {last}" if most else last
-
-
-def _changed(judged: pd.DataFrame) -> pd.DataFrame:
-    return judged[judged.changes.astype(bool)]  # without rows the column has no type of its own

@@ -231,7 +231,7 @@ def stacked(
     bars, left = {}, np.zeros(len(parts))
     for name, (color, hatch) in looks.items():
         edge = "0.5" if min(to_rgb(color)) > 0.8 else "white"  # a pale part has an outline
-        look = {"facecolor": color, "hatch": hatch, "edgecolor": edge, "linewidth": 0.5}
+        look: dict[str, Any] = {"facecolor": color, "hatch": hatch, "edgecolor": edge, "lw": 0.5}
         bars[name] = axes.barh(parts.index, parts[name], height, left, label=name, **look)
         left += parts[name].to_numpy()
     return bars

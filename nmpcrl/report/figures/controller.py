@@ -238,4 +238,4 @@ def _length(states: Matrix) -> float:
 def _apart(a: Rollout, b: Rollout) -> float:
     """Largest distance [m] from a point of one trajectory to the nearest point of the other."""
     first, second = a.states[:, :2], b.states[:, :2]
-    return max(directed_hausdorff(*two)[0] for two in ((first, second), (second, first)))
+    return max(float(directed_hausdorff(*two)[0]) for two in ((first, second), (second, first)))

@@ -33,10 +33,10 @@ def frame(task: Task, states: Matrix) -> NDArray[np.uint8]:
         axes = figure.subplots()
         draw_task(axes, task)
         low, high = task.lower[:2], task.upper[:2]
-        axes.add_patch(Rectangle(low, *(high - low), fill=False, ec=INK, lw=1.6))
+        axes.add_patch(Rectangle(tuple(low), *(high - low), fill=False, ec=INK, lw=1.6))
         axes.plot(states[:, 0], states[:, 1], color=TEAL)
         place, heading, radius = states[-1, :2], states[-1, 2], task.robot_diameter / 2
-        axes.add_patch(Circle(place, radius, fc=WINE, ec=INK, lw=0.8, zorder=3))
+        axes.add_patch(Circle(tuple(place), radius, fc=WINE, ec=INK, lw=0.8, zorder=3))
         ahead = place + radius * np.array([np.cos(heading), np.sin(heading)])
         axes.plot(*np.transpose([place, ahead]), color="white", lw=2, zorder=4)
         (left, bottom), (right, top) = low - MARGIN, high + MARGIN

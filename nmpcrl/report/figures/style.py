@@ -102,7 +102,7 @@ def titled(figure: Drawn, title: str, source: str = "", legend: Axes | Sequence[
         plain = (re.sub(r"[${}_^]", "", re.sub(r"\\[a-zA-Z]+", "x", name)) for name in names)
         widest = 4.8 + 0.56 * max(map(len, plain))  # in letters of 10 points, with its line
         columns = max(1, int((7.2 * WIDTH + 2) / widest))  # nothing stands after the last
-        place = {"loc": "outside lower left", "alignment": "left"}
+        place: dict[str, Any] = {"loc": "outside lower left", "alignment": "left"}
         box = figure.legend(handles, names, ncols=columns, **place)
         box.set_title(fill(source, 78), prop=FontProperties(size="small"))
         box.get_title().set_color("0.35")
