@@ -74,7 +74,7 @@ def measured(found: Evidence, verdict: Verdict) -> Drawn:
     placed = logarithmic(axes, "y", values.to_numpy(float).ravel(), border)
     kinds = strips(axes, values, placed)
     axes.axhline(border, **LIMIT)
-    axes.set_ylabel(fill(label, 28))
+    axes.set_ylabel(fill(label, 24))
     _shares(panel, verdict)
     yes, of = verdict.counts["all"]
     title = _judged(verdict, f"{FINDINGS[verdict.claim]} in {yes} of {of} {verdict.unit}")

@@ -23,8 +23,6 @@ from nmpcrl.report.figures.style import (
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Records
 
-BELOW = 2.4  # more of the map [m], for its legend
-EXTENT = (-2.6, 5.4)  # of the map [m], where nothing stands beyond
 NAMED = 4  # components of theta that are named, those that move most; the others are grey
 WIDE = 10  # what an axis goes up to that is linear
 FIRST: dict[str, Any] = {"color": INK, "linestyle": ":", "linewidth": 1.2}
@@ -61,7 +59,8 @@ def run_page(records: Records, frozen: Records | None = None) -> Drawn:
         over_episodes(panels[name])
     before, after = metrics.initial_cost(records), metrics.final_cost(records)
     title = f"{experiment.learner}: cost without noise {before:.0f} at first, {after:.0f} at last"
-    return titled(figure, title, f"{experiment}: {records.facts['stopped']}")
+    source = f"{experiment}: {records.facts['stopped']}"
+    return titled(figure, title, source, panels["map"])
 
 
 def _map(axes: Axes, records: Records, experiment: Experiment) -> None:
@@ -75,10 +74,7 @@ def _map(axes: Axes, records: Records, experiment: Experiment) -> None:
         label = f"θ after {rollouts['episode'][row]} episodes"
         axes.plot(path[:, 0], path[:, 1], label=label, **style)
         axes.plot(*path[-1:, :2].T, look.marker, color=style["color"], markersize=4)
-    y = [task.start[1], task.target[1], *task.discs[1]]
-    low, high = min(EXTENT[0], min(y) - 0.6) - BELOW, max(EXTENT[1], max(y) + 0.6)
-    axes.set(xlim=(task.lower[0] - 0.5, task.upper[0]), ylim=(low, high))
-    axes.legend(loc="lower left")
+    axes.set_xlim(task.lower[0] - 0.5, task.upper[0])
     inside = int((task.overlap(path).max(axis=-1) > metrics.TOUCH).sum())
     away = task.distance(path[-1])
     axes.set_title(f"{away:.1f} from the target at the end, {inside} states inside")
