@@ -110,10 +110,3 @@ def named_table(table: pd.DataFrame, part: str) -> pd.DataFrame:
         count = {"solved": f"{ended.sum()} of {len(ended)}", "CPU time [s]": f"{row.seconds:.1f}"}
         shown[row.name] = (each + np.where(ended, "", "*")).to_dict() | count
     return pd.DataFrame.from_dict(shown, "index")
-
-
-def safest(advised: pd.DataFrame) -> list[str]:
-    """The entries that solve every layout, at each budget at which they are judged."""
-    every = advised.solved.map(lambda share: share.value == 1)
-    by_entry = every.groupby(advised.entry, sort=False).all()
-    return [*by_entry.index[by_entry]]

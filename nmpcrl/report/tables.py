@@ -121,7 +121,8 @@ def verdict_map(judged: pd.DataFrame) -> str:
     before = judged.base.map(WORDS).add(" → ").where(judged.changes.astype(bool), "")
     shares = judged.share.map(" {:.0%}".format, na_action="ignore").fillna("")
     cells = before + judged.outcome.map(_word) + shares
-    rows = judged.assign(cell=cells).set_index(["departure", "variant", "claim"])
+    letters = judged.departure.replace("", "–")
+    rows = judged.assign(cell=cells, departure=letters).set_index(["departure", "variant", "claim"])
     by_claim = rows.cell.unstack(sort=False).fillna("").rename_axis(["letter", "changed"])
     by_claim.columns = [f"{name}<br>{SHORT[name]}" for name in by_claim]
     return shown(by_claim, escape=False)

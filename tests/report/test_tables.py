@@ -167,7 +167,6 @@ def test_a_method_has_its_word_its_evidence_and_its_price_by_budget_the_smaller_
     found = remedies.evidence(ADVICE, "CMA-ES")
     assert f"{found['gain'].value:.2f}" == "0.80 [0.70, 0.90]"
     assert found["solved"].value.value == pytest.approx(0.9)
-    assert remedies.safest(ADVICE) == ["DPG"]
 
 
 def test_a_part_has_each_layout_the_greatest_share_first_and_a_star_where_one_is_unsolved():
