@@ -90,7 +90,7 @@ def problem(
 ) -> dict[str, Any]:
     """The numbers that a host passes to the module, for JSON.
 
-    These are the sizes that `solvers.model` names, the units of states and inputs, in which all
+    These are the sizes that `solvers.stages` names, the units of states and inputs, in which all
     else is given, and the `ARRAYS`: `riccati.Arguments` with `kind` for u_0 free and given, and the
     inputs of `others` and `drawn`, which `find` explains. A W of None is infinite.
     """

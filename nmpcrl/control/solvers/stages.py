@@ -3,6 +3,9 @@
 Horizon, discount, weights, bounds, data and the number of lines are arguments, so that one
 compilation serves them all. Rows are *fixed*, or of each *line* of some data (`Soft.each`); their
 derivatives are written at their nonzeros, and so are the products that fold them into a stage.
+A function of all rows, as `measure_rows`, calls one of each. Arrays of rows hold those of all
+stages; `at` says where those of the stage begin. A row that depends on u is absent at stage N, and
+the u that is given there counts nothing. A stage's Lagrangian is discount l + costate' f + lam' h.
 """
 
 from collections.abc import Iterator
@@ -14,6 +17,8 @@ import numpy as np
 from nmpcrl.control.codegen.source import INNER, source
 from nmpcrl.control.problem import Problem
 
+# SOFT rows belong to no line, FIXED with hard ones behind them, and PER to each line of data; OWN
+# data of a stage belong to no line, and WIDTH to each.
 HEADER = '''"""A problem's functions."""
 
 import math
@@ -31,7 +36,7 @@ ALL_ROWS = """{inner}def {name}_rows({fixed}, at, lines):
 """
 MATRICES = ("A", "B", "Q", "S", "R", "hx", "hu")
 SPARSE = ("A", "B", "hx", "hu")
-ADDED = ("px", "pu", "q", "r", "Q", "S", "R", "gradient")
+ADDED = ("px", "pu", "q", "r", "Q", "S", "R", "gradient")  # to what the array holds
 BEGINS = {"line": "of", **dict.fromkeys(  # at which index of an array a stage's rows begin
     ("h", "size", "lam", "dlam", "hx", "hu", "stiff", "pull"), "at")}  # fmt: skip
 DIRECTIONS = {"x": "dx", "u": "du", "costate": "dcostate", "theta": "w", "lam": "dlam"}
