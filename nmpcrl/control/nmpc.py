@@ -282,7 +282,7 @@ class Nmpc(Described):
 
         It takes half a minute, once on a machine, and says on standard error what it does and for
         how long: numba's typing takes one half, LLVM the other. CasADi's solvers take no time.
-        The loop of `learning` is compiled at the first run.
+        The loop of `learning` is compiled at the first run or rollout.
         """
         if isinstance(self._free.solver, Compiled):
             _ = self._free.solver.slopes
