@@ -234,11 +234,15 @@ def _known_step(learner: Learner, nmpc: Nmpc) -> SemiGradient | GradientTD | Non
     if valued is nothing:
         return SemiGradient(0.0)
     if type(valued) is Imitation:
-        known = type(valued.network) is QNetwork and type(valued.target) in (Target, type(None))
+        network, target = valued.network, valued.target
+        known = target is None or (type(target) is Target and target.network is network)
+        inputs = nmpc.n + nmpc.m + valued.with_theta * nmpc.problem.theta.size
+        known = known and type(network) is QNetwork and network.inputs == inputs
         known = known and valued.actions is None
     else:
         known = type(valued) is SecondSolve and valued.nmpc is nmpc
     if type(step) is GradientTD:
         own = step.follow is auxiliary_step and (step.curved is None or step.curved is nmpc)
-        return step if known and own and step.gamma == nmpc.gamma else None
+        own = own and step.gamma == nmpc.gamma and type(valued) is SecondSolve
+        return step if known and own else None
     return step if known and type(step) is SemiGradient else None

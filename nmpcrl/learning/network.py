@@ -91,6 +91,11 @@ class Predictor:
         """Whether the weights have seen a fit."""
         return bool(self.net[COUNTS][1])
 
+    @property
+    def inputs(self) -> int:
+        """The length of an input vector."""
+        return len(self.net[SCALES]) - 1
+
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
         rows = self._rows(inputs)
@@ -100,10 +105,9 @@ class Predictor:
 
     def _rows(self, inputs: Vector) -> Matrix:
         """Inputs as a matrix with one row each."""
-        length = len(self.net[SCALES]) - 1
-        if inputs.shape[-1] != length:
-            raise ValueError(f"inputs of length {inputs.shape[-1]} must have length {length}")
-        return np.ascontiguousarray(inputs, float).reshape(-1, length)
+        if inputs.shape[-1] != self.inputs:
+            raise ValueError(f"inputs of length {inputs.shape[-1]} must have length {self.inputs}")
+        return np.ascontiguousarray(inputs, float).reshape(-1, self.inputs)
 
 
 class QNetwork(Predictor):
@@ -205,8 +209,8 @@ class Target(Predictor):
         weights, examples, order, counts, *rest = network.net
         empty = (examples[:0].copy(), order[:0].copy(), np.zeros_like(counts))
         self.net = (weights[:1].copy(), *empty, *rest)
-        self._network, self.every, self.rate = network, every, rate
+        self.network, self.every, self.rate = network, every, rate
 
     def follow(self) -> None:
         """Count a step in which the network was fitted, and move where it is time."""
-        machine_code().follow(self.net, self._network.net, self.every, self.rate)
+        machine_code().follow(self.net, self.network.net, self.every, self.rate)

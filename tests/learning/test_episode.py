@@ -14,6 +14,7 @@ from nmpcrl.control import Riccati, SolverError, differential_drive
 from nmpcrl.control.solvers import riccati
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.learning.episode import NUMBERS, Loop, _row, episodes
+from nmpcrl.learning.learners import Learner, gradient_td, semi_gradient
 from nmpcrl.learning.loop import FIND, SLOPES
 from nmpcrl.learning.remedies import guarded
 from nmpcrl.learning.training import Trainer
@@ -201,3 +202,15 @@ def test_parts_that_the_loop_does_not_know_take_the_generator(robot, change):
     changed = {"make": learning.frozen, "nmpc": robot, "explore": noise(steps=3)} | change(robot)
     columns = assert_same(**changed, looped=False)
     assert len(columns["cost"]) == EPISODES * 3
+
+
+@pytest.mark.parametrize(
+    ("inputs", "rule", "message"),
+    [(5, gradient_td(1e-7, 1e-7, 0.97), "needs the next state's features: bootstrap by SecondS"),
+     (4, semi_gradient(1e-7), "inputs of length 5 must have length 4")],
+)  # fmt: skip
+def test_parts_that_do_not_fit_each_other_are_refused(robot, inputs, rule, message):
+    network = learning.QNetwork(inputs, np.random.default_rng(0), batch=2)
+    imitation = learning.Imitation(network, with_theta=False)
+    with pytest.raises(ValueError, match=message):
+        list(episodes(Learner.of("own", robot, rule, imitation), robot, weights(), noise()))

@@ -9,7 +9,6 @@ import pytest
 from scipy.stats import kstest
 
 from nmpcrl.learning import (
-    Imitation,
     Learner,
     SecondSolve,
     Transition,
@@ -25,7 +24,6 @@ from nmpcrl.learning import (
     regularized_deep_expected_sarsa,
     step_matched,
 )
-from nmpcrl.learning.learners import gradient_td
 
 ALPHA, BETA = 0.1, 0.01
 THETA, W = np.array([1.0, 0.5, -1.0]), np.array([0.1, 0.0, 0.2])
@@ -91,16 +89,9 @@ def test_a_deep_learner_moves_once_its_network_is_ready_and_has_the_options_of_i
     np.testing.assert_allclose(literal.weights.theta, DEEP)
 
 
-def test_functions_for_rules_and_bootstraps_without_features_are_refused(
-    controller, network, transition, weights
-):
+def test_functions_for_rules_are_refused(controller):
     with pytest.raises(ValueError, match=r"must be an UpdateRule: write UpdateRule\(step\)"):
         Learner("old", SecondSolve(controller), lambda weights, *_: weights, 0.9)
-    network.batch = 1
-    bootstrap = Imitation(network, with_theta=True)
-    mismatched = Learner("GES by network", bootstrap, gradient_td(ALPHA, BETA, 0.9), 0.9)
-    with pytest.raises(ValueError, match="needs the next state's features: bootstrap by SecondS"):
-        mismatched.step(weights, transition(THETA))
 
 
 def test_a_rule_of_the_user_has_a_memory_and_hears_of_failed_episodes(
