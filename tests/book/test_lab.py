@@ -101,17 +101,20 @@ def await_answer(address: str, server: subprocess.Popen) -> None:
 
 @pytest.fixture
 def opened(address, folder, browser) -> Iterator[Any]:
-    """Opens a notebook, and waits until every cell is there and every formula is typeset."""
+    """Opens a notebook, and waits for every cell, picture and formula."""
     tab = browser.new_page(viewport={"width": 1200, "height": 1000})
 
     def open_notebook(state: str, name: str) -> Any:
         cells = nbformat.read(folder / state / f"{name}.ipynb", 4).cells
         prose = sum(cell.cell_type == "markdown" for cell in cells)
+        shown = [out.get("data", {}) for cell in cells for out in cell.get("outputs", [])]
+        pictures = sum("image/png" in one for one in shown)  # an SVG would wait to be trusted
         tab.goto(f"{address}/{state}/{name}.ipynb?reset")
         tab.wait_for_function(
-            "([all, prose]) => document.querySelectorAll('.jp-Notebook .jp-Cell').length == all"
-            " && document.querySelectorAll('.jp-MarkdownOutput').length == prose",
-            arg=[len(cells), prose],
+            "([all, prose, pictures]) => document.querySelectorAll('.jp-Notebook .jp-Cell').length"
+            " == all && document.querySelectorAll('.jp-MarkdownOutput').length == prose &&"
+            " document.querySelectorAll('.jp-RenderedImage, .jp-RenderedSVG').length == pictures",
+            arg=[len(cells), prose, pictures],
         )
         tab.wait_for_function(
             f"() => [...document.querySelectorAll('{SHOWN}')]"

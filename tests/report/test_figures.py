@@ -260,14 +260,13 @@ def test_the_same_figure_gives_the_same_bytes(kind):
     assert one.written(kind) == other.written(kind)
 
 
-def test_a_notebook_is_shown_one_picture_and_its_finding(monkeypatch):
+def test_a_notebook_is_shown_a_picture_that_need_not_be_trusted_and_its_finding(monkeypatch):
     shown = []
     monkeypatch.setattr(style, "display", lambda data, raw: shown.append(data))
     figure = style.titled(style.subplots()[0], r"$\theta_x$ grows")
     figure._ipython_display_()
     monkeypatch.setattr(style, "HEAVY", 0)
     figure._ipython_display_()
-    assert [{*one} for one in shown] == [
-        {"text/plain", f"image/{kind}"} for kind in ("svg+xml", "png")
-    ]
+    assert {*shown[0]} == {"text/plain", "image/png", "image/svg+xml"}
+    assert {*shown[1]} == {"text/plain", "image/png"}
     assert shown[0]["text/plain"] == "theta_x grows"

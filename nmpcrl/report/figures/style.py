@@ -32,13 +32,16 @@ PAGE: dict[Any, Any] = {
     "svg.hashsalt": "nmpcrl",  # the same figure, the same bytes
 }
 WIDTH = 5.0  # inches: a page 390 pixels wide shows 10 points as 10 pixels
-HEAVY = 300_000  # bytes of an SVG from which on a PNG is shown
+HEAVY = 300_000  # bytes of an SVG from which on there is only a PNG
 
 Parameters = ParamSpec("Parameters")
 
 
 class Drawn(Figure):
-    """A figure of the page's width that shows itself as an SVG or, where that is heavy, a PNG."""
+    """A figure of the page's width that shows itself as a PNG and, unless heavy, as an SVG.
+
+    A page takes the SVG. JupyterLab shows none of a notebook that it has not run itself.
+    """
 
     def __init__(self, height: float) -> None:
         super().__init__(figsize=(WIDTH, height), layout="constrained")
@@ -57,12 +60,10 @@ class Drawn(Figure):
         return file.getvalue()
 
     def _ipython_display_(self) -> None:
-        svg = self.written("svg")
-        shown = {"text/plain": self.finding}
+        svg, png = self.written("svg"), b64encode(self.written("png")).decode()
+        shown = {"text/plain": self.finding, "image/png": png}
         if len(svg) < HEAVY:
             shown["image/svg+xml"] = svg.decode()
-        else:
-            shown["image/png"] = b64encode(self.written("png")).decode()
         display(shown, raw=True)  # type: ignore[no-untyped-call]
 
 
