@@ -100,10 +100,10 @@ def _episode(
             break
         for step in trainer.steps(number, t, state, weights, warm):
             rows[t], t = _row(step), t + 1
-            weights, failure = step.weights, step.failure
+            before, weights, failure = weights, step.weights, step.failure
             solves = [one for one in step.solves if not one.took_over]
             solver = next((one.solver for one in solves if one.solver != nmpc.solver.name), solver)
-            if loop or absurd(weights, nmpc.largest):
+            if loop or (weights is not before and absurd(weights, nmpc.largest)):
                 break
         if step.last or step.next_state is None:
             break
