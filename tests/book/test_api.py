@@ -16,8 +16,8 @@ EXPORTING = ("control", "learning", "study")  # the packages whose `__init__` sa
 
 def entries(text: str) -> set[str]:
     """The names that a page describes, those of whole modules included."""
-    found = set()
-    for kind, name in DIRECTIVE.findall(text):
+    found, shown = set(), re.findall(r"^```\{eval-rst\}\n(.*?)^```$", text, flags=re.M | re.S)
+    for kind, name in DIRECTIVE.findall("".join(shown)):
         found.add(name)
         if kind == "module":
             found |= {f"{name}.{one}" for one in vars(import_module(name)) if one[0] != "_"}
