@@ -1,4 +1,7 @@
-"""The paper's robot as a task for Gymnasium, and the NMPC as its policy."""
+"""The paper's robot as a task for Gymnasium.
+
+`Policy(paper.nmpc(layout), paper.THETA_INIT)` acts by the first three observations.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +11,6 @@ import numpy as np
 from gymnasium.spaces import Box
 
 from nmpcrl import Vector
-from nmpcrl.control import Solution
 from nmpcrl.study import geometry, paper
 from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.faults import robot
@@ -82,25 +84,3 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
 
     def _observation(self) -> Vector:
         return np.concatenate([self.states[-1], self._at[len(self.states) - 1].ravel()])
-
-
-class NmpcPolicy:
-    """The NMPC with theta, shape (9,), by default theta_init, as a policy of `RobotEnv`.
-
-    The last plan in a layout is the warm start.
-    """
-
-    def __init__(self, theta: Vector | None = None) -> None:
-        self.theta = np.array(paper.THETA_INIT if theta is None else theta, float)
-        self._centres: Centres = ()
-        self._plan: Solution | None = None
-
-    def __call__(self, observation: Vector) -> Vector:
-        """The first input of the plan; SolverError if no plan is found."""
-        state, rest = observation[:3], observation[3:].reshape(-1, 2).tolist()
-        centres = tuple((x, y) for x, y in rest)
-        if centres != self._centres:
-            self._controller = paper.nmpc(centres)
-            self._centres, self._plan = centres, None
-        self._plan = self._controller.solve(state, self.theta, self._plan)
-        return self._plan.action

@@ -12,11 +12,11 @@ import pytest
 
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import ENTRIES, Judgement, Robot, entry, gain, judge, judge_all, solved
+from nmpcrl.control import Policy
 from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
 from nmpcrl.study import Experiment, ParameterError, paper, published, run
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.refusal import Refusal
-from nmpcrl.study.robot import NmpcPolicy
 
 LAYOUT, THETA = paper.LAYOUTS["A"], np.array(paper.THETA_INIT)
 QUICK = ("frozen", "TDRC", "GES-3", "guarded-ES", "averaged-ES", "undone-LSTD-Q")
@@ -145,12 +145,18 @@ def test_an_unknown_entry_a_failing_one_and_a_number_out_of_range_are_refused(
         judge_all(name, **options)
 
 
+def acting(robot):
+    """The NMPC with theta_init as a policy."""
+    policy = Policy(robot.controller, THETA)
+    return lambda observation: policy(observation[:3])
+
+
 def test_theta_and_a_policy_are_judged_alike_by_the_cost_of_a_rollout():
     found = judge(lambda robot: THETA, "J001", 1, 3)
     assert solved(found)
     assert (gain(found), found.episodes) == (0, 0)
     assert found.cost == evaluate(paper.nmpc(JUDGE["J001"]), THETA, paper.STEPS).cost
-    assert judge(lambda robot: NmpcPolicy(), "J001", 1, 3) == replace(found, seconds=ANY)
+    assert judge(acting, "J001", 1, 3) == replace(found, seconds=ANY)
     still = judge(lambda robot: lambda observation: np.zeros(2), "J001", 1, 3)
     assert not still.arrived
     assert gain(still) < 0
@@ -170,7 +176,7 @@ def spend(robot, more=0):
 
 def late(robot):
     """Begin episodes while the policy is judged."""
-    env, policy = robot.env(), NmpcPolicy()
+    env, policy = robot.env(), acting(robot)
     return lambda observation: (env.reset(), policy(observation))[1]
 
 

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from nmpcrl.control import Policy
 from nmpcrl.learning import evaluate
 from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.drawn import TUNE
-from nmpcrl.study.robot import NmpcPolicy, RobotEnv
+from nmpcrl.study.robot import RobotEnv
 
 ROBOT = "nmpcrl.gym:nmpcrl/Robot-v0"
 THETA = np.array(paper.THETA_INIT)
@@ -36,7 +37,9 @@ def test_gymnasiums_own_checks_pass(layout):
 
 @pytest.mark.parametrize("layout", ["A", "E"])
 def test_the_nmpc_as_a_policy_makes_the_rollout_by_which_theta_is_judged(layout):
-    states, rewards, end = follow(gymnasium.make(ROBOT, layout=layout), NmpcPolicy())
+    policy = Policy(paper.nmpc(layout), THETA)
+    env = gymnasium.make(ROBOT, layout=layout)
+    states, rewards, end = follow(env, lambda seen: policy(seen[:3]))
     judged = evaluate(paper.nmpc(layout), THETA, paper.STEPS)
     np.testing.assert_array_equal(states[:, :3], judged.states)
     np.testing.assert_array_equal(states[0], [*paper.START, *np.ravel(paper.LAYOUTS[layout])])
