@@ -1,7 +1,7 @@
 """The paper's numbers, layouts and experiments, their runs, and the store of records."""
 
 from nmpcrl.study import paper
-from nmpcrl.study.design import paper_runs, sweep
+from nmpcrl.study.design import sweep
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.files import StoreError
 from nmpcrl.study.parameters import ParameterError
@@ -21,7 +21,6 @@ __all__ = [
     "fetch",
     "fetch_all",
     "paper",
-    "paper_runs",
     "run",
     "stored",
     "sweep",

@@ -1,4 +1,4 @@
-"""Sets of runs: grids of field values, a chapter's runs, and the parts of the main study.
+"""Sets of runs: grids of field values, and the parts of the main study.
 
 The main table varies layout, reading of the exploration decay, and seed, which the paper leaves
 open. A variant changes one other field.
@@ -13,7 +13,6 @@ from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import MAIN, PAPER, Experiment, frozen_arm
-from nmpcrl.study.geometry import Centres
 from nmpcrl.study.learners import DECAYS, LEARNERS
 from nmpcrl.study.parameters import Allowed, ParameterError, is_list, several
 
@@ -52,20 +51,6 @@ def _values(name: str, given: Any) -> tuple[Any, ...]:
             return (FIELDS[name].check(name, given),)
     values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
     return values
-
-
-def paper_runs(
-    episodes: int = paper.EPISODES,
-    seeds: Sequence[int] = (0, 1),
-    layout: str | Centres = "A",
-    **others: Any,
-) -> tuple[Experiment, ...]:
-    """The runs of a chapter: the paper's learners and the frozen one, in both readings.
-
-    `others` are further fields of `Experiment`, as `sweep` takes them.
-    """
-    grid = {"learner": (*PAPER, "frozen"), "decay": tuple(DECAYS), "seed": seeds}
-    return sweep(**grid, episodes=episodes, layout=layout, **others)
 
 
 PERTURBATION = 1e-12  # added to theta_x at the start
@@ -137,7 +122,7 @@ VARIANTS = _variants()
 
 def main_table(
     learners: Sequence[str] = MAIN,
-    layouts: Sequence[str] = LAYOUTS,
+    layouts: Sequence[Any] = LAYOUTS,
     seeds: Sequence[int] = SEEDS,
     episodes: int = paper.EPISODES,
     decays: Sequence[str] = tuple(DECAYS),
