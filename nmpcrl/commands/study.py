@@ -17,7 +17,7 @@ def train(parts: tuple[str, ...], workers: int | None, *, dry_run: bool, publish
     wanted = {e: part for e, part in every.items() if not parts or part in parts}
     if publish:
         published.folder().mkdir(parents=True, exist_ok=True)  # where it cannot be, before any work
-    missing = [e for e in wanted if not summaries.SUMMARIES.is_stored(e)]
+    missing = [e for e in wanted if not summaries.SUMMARIES.path_of(e).exists()]
     stored = f"{len(wanted) - len(missing):,} of {len(wanted):,} runs are stored"
     hours = sum(map(seconds_of, missing)) / 3600
     click.echo(f"{stored} in {folder()}; the others take about {hours:.1f} h of one core")

@@ -76,13 +76,6 @@ class Store(Generic[Value]):
             return None
         return value  # type: ignore[no-any-return]
 
-    def is_stored(self, named: Named) -> bool:
-        """Whether there is a file of the named run; `read` alone checks its tables."""
-        try:
-            return not refused(named, about(self.path_of(named)).facts)
-        except (FileNotFoundError, DamagedRecords):
-            return False
-
     def fetch(self, named: Named, **options: Any) -> Value:
         """The run of an experiment or a trial: read if it is stored, otherwise made and stored.
 

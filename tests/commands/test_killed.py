@@ -118,7 +118,7 @@ def test_forty_kills_lose_nothing_and_change_no_number(own, tmp_path, monkeypatc
         if child.poll() == 0:
             monkeypatch.setenv("NMPCRL_RUNS", str(runs))
             assert by_arm(of_file(own).made()) == by_arm(table)
-            assert all(RUNS.is_stored(one) for one in STUDY)
+            assert all(map(RUNS.read, STUDY))
             for one, found in fetch_all(STUDY).items():
                 assert_same_numbers(found, records[one])
             rounds, child = rounds + 1, None

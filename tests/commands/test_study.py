@@ -58,7 +58,7 @@ def done(command, *words, code=0):
 def test_study_says_what_is_missing_trains_a_part_and_then_the_rest(command, small, monkeypatch):
     assert "0 of 6 runs are stored" in done(command, *STUDY_OF, "--dry-run")
     done(command, *STUDY_OF, "--part", "N = 5", "--workers", "1")
-    assert {STUDY[e] for e in STUDY if SUMMARIES.is_stored(e)} == {"N = 5"}
+    assert {STUDY[e] for e in STUDY if SUMMARIES.read(e)} == {"N = 5"}
     with monkeypatch.context() as patch:
         patch.setattr(store, "run", raising(ArithmeticError("a mistake")))
         said = done(command, *STUDY_OF, code=1)
@@ -94,7 +94,7 @@ def test_verify_trains_as_many_runs_as_are_asked_for_besides_the_stored_ones(
         assert "--sample 5 trains five for" in done(command, "verify", code=1)
     now = min(stored + 2, len(STUDY))
     assert f"{now} bit for bit, " in done(command, "verify", "--sample", "2")
-    assert sum(map(SUMMARIES.is_stored, STUDY)) == now
+    assert sum(SUMMARIES.path_of(e).exists() for e in STUDY) == now
     assert "sample = 7 must be a whole number from 0 to 6" in done(
         command, "verify", "--sample", "7", code=1
     )

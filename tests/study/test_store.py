@@ -75,7 +75,6 @@ def test_a_file_that_was_written_before_a_field_and_with_another_member_is_read(
         members = {**file, "checksum": np.array("0" * 64)}
     np.savez_compressed(path, **members)
     no_run()
-    assert RUNS.is_stored(LEARNING)
     for ask in (fetch, one_of_all):
         assert_same_numbers(ask(LEARNING), records)
 
@@ -103,10 +102,10 @@ OTHER = [{"key": "0"}, {"sources": "0"}, {"solver": "fatrop"}]  # versions, code
 def test_where_a_file_is_not_the_run_the_run_is_trained_again(other, ask, capsys):
     path, honest = RUNS.path_of(QUICK), fetch(QUICK)
     replace(honest, facts=honest.facts | other).save(path)
-    assert not RUNS.is_stored(QUICK)
+    assert not RUNS.read(QUICK)
     assert_same_numbers(ask(QUICK), honest)
     assert capsys.readouterr().err.startswith(f"{path} ")
-    assert RUNS.is_stored(QUICK)
+    assert RUNS.read(QUICK)
 
 
 @both_ways
