@@ -18,11 +18,7 @@ INSTEAD = {  # of commands that earlier versions had
 
 
 class Commands(click.Group):
-    """Commands in the order in which they were added."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """The names in the order of `commands`."""
-        return list(self.commands)
+    """Commands whose known errors end in one sentence."""
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """The command; a name of `INSTEAD` is refused with what to use instead."""

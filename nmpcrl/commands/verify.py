@@ -4,8 +4,6 @@ import click
 
 from nmpcrl.commands.options import WORKERS
 
-RELOCKED = 60  # runs that are trained afresh before the code is locked anew
-
 
 @click.command()
 @click.option("--sample", metavar="N", default=0, help="Train N more runs and compare them.")
@@ -26,7 +24,7 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
     known = published.load()
     whole(0, len(known.rows)).check("sample", sample)
     if relock:
-        lock, there, here = reproduce.relock(known, sample or RELOCKED, workers=workers)
+        lock, there, here = reproduce.relock(known, sample or 60, workers=workers)
         said = f"{there + here} runs trained again gave the same bits"
         said = f"{said}, {there} as published, {here} as stored"
         if not there + here:
