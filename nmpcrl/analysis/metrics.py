@@ -52,11 +52,6 @@ def late_cost_range(run: Run) -> float:
     return float((late.max() - late.min()) / cost[0])
 
 
-def final_theta(records: Records) -> Column:
-    """theta when training stopped, shape (d,)."""
-    return np.asarray(records.steps["theta"][-1])
-
-
 def late_training_cost(cost: Vector) -> float:
     """Median of `training_cost` over the last `LATE` episodes, or over a shorter second half.
 

@@ -4,7 +4,6 @@ A direct search calls `cost` at most `budget` times, first with the start, and r
 least cost. `search` is one long CMA-ES in a layout: a lower bound of the possible gain.
 """
 
-from bisect import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -185,10 +184,6 @@ class SearchResult:
     def gain(self) -> float:
         """Share of theta_init's cost that theta saves."""
         return 1 - self.cost / self.initial
-
-    def after(self, rollouts: int) -> float:
-        """The lowest cost of the first rollouts: the end of a search with a smaller budget."""
-        return self.best[bisect(self.rollouts, rollouts) - 1]
 
 
 def search(layout: str, budget: int = BUDGET, seed: int = 0) -> SearchResult:

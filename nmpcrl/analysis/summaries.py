@@ -6,8 +6,6 @@ from nmpcrl.study.provenance import summary_key
 from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.store import RUNS, Store, refused, train
 
-FOLDER = "summaries"  # among the runs
-
 
 def make(experiment: Experiment, *, afresh: bool = False) -> RunSummary:
     """The summary of a run, which is trained if it is not stored, or if `afresh` holds.
@@ -20,5 +18,5 @@ def make(experiment: Experiment, *, afresh: bool = False) -> RunSummary:
     return summarise(records)
 
 
-SUMMARIES = Store(RunSummary, make, summary_key, FOLDER)
+SUMMARIES = Store(RunSummary, make, summary_key, "summaries")
 fetch_summaries = SUMMARIES.fetch_all

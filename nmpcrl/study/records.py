@@ -140,8 +140,3 @@ def load_run(
         except Exception as error:
             raise DamagedRecords(f"{path} is damaged, or not a run") from error
     return about, tables
-
-
-def about(path: Path) -> About:
-    """The experiment and the facts of a file; errors as in `load_run`."""
-    return load_run(path, {})[0]

@@ -19,7 +19,7 @@ from nmpcrl.study.jobs import Failed, make_once
 from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import environment, key
-from nmpcrl.study.records import About, DamagedRecords, Records, about
+from nmpcrl.study.records import About, DamagedRecords, Records, load_run
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.trial import Trial
@@ -184,7 +184,7 @@ def stored() -> dict[Path, About]:
     found = {}
     for path in sorted(folder().glob("*.npz")):
         try:
-            found[path] = about(path)
+            found[path], _ = load_run(path, {})
         except (OSError, DamagedRecords) as error:
             say(f"{error}; it is ignored")
     return found

@@ -100,7 +100,7 @@ def test_a_row_measures_as_the_metrics_do(records, short):
     for name in ("final_cost", "initial_cost", "late_cost_range"):
         assert found[name] == getattr(metrics, name)(records)
     theta = [found[f"theta_{i}"] for i in range(9)]
-    np.testing.assert_array_equal(theta, metrics.final_theta(records))
+    np.testing.assert_array_equal(theta, records.steps["theta"][-1])
     assert (found["learner"], found["seed"]) == ("RDES", 0)
 
 

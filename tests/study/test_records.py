@@ -9,7 +9,7 @@ import pytest
 from builders import assert_same_numbers, made_records
 
 from nmpcrl.study import DamagedRecords, Experiment, Records
-from nmpcrl.study.records import about, final_cost
+from nmpcrl.study.records import final_cost, load_run
 
 RUN = made_records(Experiment("ES", seed=3, episodes=40, steps=10, evaluate_every=20), 40)
 
@@ -28,7 +28,7 @@ def path(tmp_path):
 
 def test_a_wrong_byte_is_noticed_or_changes_nothing_and_a_first_edition_s_run_is_read(path):
     RUN.save(path)
-    assert about(path).facts == RUN.facts
+    assert load_run(path, {})[0].facts == RUN.facts
     content, noticed = path.read_bytes(), 0
     for place in np.random.default_rng(0).integers(len(content), size=100):
         damaged = bytearray(content)
