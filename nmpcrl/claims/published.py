@@ -123,13 +123,8 @@ class Evidence:
 
     @property
     def origin(self) -> str:
-        """The origin, learners, layouts and readings of the runs, for numbers on pages."""
-        if self.is_published:
-            return "the published main table"
-        learners, layouts, decays = (
-            ", ".join(self.runs[name].unique()) for name in ("learner", "layout", "decay")
-        )
-        return f"{self.mark}, of {learners}; layouts {layouts}; noise per {decays}"
+        """The origin of the runs, for numbers on pages."""
+        return "the published main table" if self.is_published else self.mark
 
     @property
     def is_published(self) -> bool:

@@ -313,11 +313,6 @@ class Course:
     there: pd.DataFrame  # whether the robot arrives, under every seed, as `shares`
 
     @property
-    def episodes(self) -> list[int]:
-        """Episodes before each checkpoint."""
-        return [*self.shares.index]
-
-    @property
     def last(self) -> pd.Series:
         """The shares at the last checkpoint."""
         return self.shares.iloc[-1]
@@ -342,8 +337,9 @@ class Course:
         yes = self.median <= 1 + TOLERANCE
         last = np.flatnonzero(~yes)
         stays = last[-1] + 1 if last.size else 0
-        first = float(self.episodes[int(yes.argmax())]) if yes.any() else np.inf
-        return first, float(self.episodes[stays]) if stays < len(yes) else np.inf
+        episodes = self.shares.index
+        first = float(episodes[int(yes.argmax())]) if yes.any() else np.inf
+        return first, float(episodes[stays]) if stays < len(yes) else np.inf
 
     @property
     def numbers(self) -> dict[str, float]:

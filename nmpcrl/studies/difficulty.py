@@ -39,8 +39,7 @@ RAISED = 0.01  # of theta_c, for the slope of the cost
 OPEN = 1.0  # theta_c beyond which it does not matter where a gap closes
 HORIZONS = (20, 40)  # beside the paper's
 SAME_CLOSING = 0.05  # of theta_c: the step of the grid on which two horizons close the same gap
-RAISED_TO = 0.5  # the end of that grid
-GRID = np.arange(0, RAISED_TO + 1e-9, SAME_CLOSING)
+GRID = np.arange(0, 0.5 + 1e-9, SAME_CLOSING)
 STOPS = {n: f"stops_{n}" for n in (paper.HORIZON, *HORIZONS)}  # columns by horizon
 
 MEASURES = (  # a higher one means easier, or harder where a comment says so

@@ -245,7 +245,7 @@ class Investigation:
                 lambda job: self.make(*job),
                 missing.items(),
                 name=lambda job: f"{self.name}-{self.key(job[0])[:16]}",
-                read=self._stored,
+                read=lambda job: self._lines(self.key(job[0])).get(self.key(job[0]), (None,))[0],
                 save=self._append,
                 workers=workers,
                 label=part,
@@ -253,10 +253,6 @@ class Investigation:
             if failures:
                 raise Failed(failures, len(missing))
         return self.made()
-
-    def _stored(self, job: tuple[Condition, Any]) -> Row | None:
-        """The row of a condition, if it was made here."""
-        return next((row for row, _ in self._lines(self.key(job[0])).values()), None)
 
     def _append(self, job: tuple[Condition, Any], row: Row) -> None:
         """Store a row."""

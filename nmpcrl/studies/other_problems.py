@@ -238,18 +238,10 @@ def q_learn(theta: Vector, e: Vector, *, newest: bool = False) -> tuple[float, M
         state = gz.TRUE_A @ state + gz.TRUE_B @ action + np.array([one, 0.0])
         plan = nmpc.solve(state, theta, plan)
         delta = td_error(costs[-1], gz.GAMMA, solution.value, plan.value)
-        theta = normalised_step(theta, delta, solution.features)
+        phi = solution.features  # mpcrl's step of Newton: phi phi' + 1e-3 I for a Hessian
+        theta = theta + RATE * delta * phi / (RIDGE + phi @ phi)
         path.append(theta)
     return float(np.sum(costs)), np.array(path)
-
-
-def normalised_step(theta: Vector, delta: float, phi: Vector) -> Vector:
-    """theta + 0.05 delta phi / (1e-3 + |phi|^2).
-
-    mpcrl's step of Newton with the outer product of one gradient and 1e-3 I for a Hessian.
-    """
-    moved: Vector = theta + RATE * delta * phi / (RIDGE + phi @ phi)
-    return moved
 
 
 class Runs(NamedTuple):

@@ -52,7 +52,6 @@ from nmpcrl.study.setup import compile_ahead
 
 CLOSES_BEFORE = 0.2  # theta_c; the pilot: below it the first gap of the first trajectory closes
 STANDING = 0.05  # [m]; a robot stands if it moves less in the last `STOOD` steps of a rollout
-STOOD = trap.STOOD
 CLIFF_RAISED = 0.02  # share by which the best theta_c is raised, beside the cliff
 CLIFF_COST = 0.5  # share of the best cost that this adds
 DEAD_BY = 20  # episodes: a run that was stopped by then overshot early

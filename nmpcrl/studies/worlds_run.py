@@ -100,12 +100,6 @@ def exploration(episodes: int, seed: int) -> Exploration:
     return Exploration.draw(rng, shape, deviation=paper.NOISE, decay_rate=paper.DECAY_RATE)
 
 
-def begin(nmpc: Nmpc, **known: Any) -> Vector:
-    """Theta where learning begins, with known parameters of the model."""
-    assert nmpc.problem
-    return nmpc.problem.vector(**known)
-
-
 def theta_of(
     policy: str, nmpc: Nmpc, world: World, start: Vector, episodes: int, seed: int
 ) -> Vector:
@@ -131,7 +125,8 @@ def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Ro
     view, policy = setting
     world = World(SCENARIOS[place], PREDICTORS[view])
     nmpc = controller(obstacles=len(world.motions))
-    made = judged(nmpc, theta_of(policy, nmpc, world, begin(nmpc), episodes, seed), world)
+    theta = theta_of(policy, nmpc, world, nmpc.problem.theta, episodes, seed)
+    made = judged(nmpc, theta, world)
     return row(made.cost, *made.contacts, made.arrived)
 
 
@@ -140,7 +135,7 @@ def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row
     fault, policy = FAULTS[setting[0]], setting[1]
     nmpc = controller("diagonal" if policy in ("init", "grid", "ES") else "model")
     world = World(still(JUDGE[place]), fault=fault)
-    start = begin(nmpc, **(fault.model if policy in ORACLES else {}))
+    start = nmpc.problem.vector(**(fault.model if policy in ORACLES else {}))
     theta = theta_of(policy, nmpc, world, start, episodes, seed)
     draws = DRAWS if fault.slip or any(fault.noise) else 1
     made = [judged(nmpc, theta, world, draw) for draw in range(draws)]
@@ -177,7 +172,7 @@ def gradient(deviation: float, place: str, episodes: int, seed: int) -> Row:
 def terminal(kind: str, place: str, episodes: int, seed: int) -> Row:
     """ES with a terminal cost, in the paper's world; costs are shares of theta_init's."""
     nmpc, world = controller(kind), World(still(JUDGE[place]))
-    start = begin(nmpc)
+    start = nmpc.problem.theta
     theta = theta_of("ES", nmpc, world, start, episodes, seed)
     initial, made = (judged(nmpc, each, world) for each in (start, theta))
     return row(made.cost / initial.cost, *made.contacts, made.arrived, theta.tolist())
@@ -195,4 +190,4 @@ def compile_ahead(missing: Iterable[tuple[Condition, Any]]) -> None:
     for part in {one.part for one, _ in missing}:
         for each in CONTROLLERS.get(part, [("diagonal", 4)]):
             nmpc = controller(*each)
-            nmpc.solve(np.array(paper.START), begin(nmpc))
+            nmpc.solve(np.array(paper.START), nmpc.problem.theta)

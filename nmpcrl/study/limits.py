@@ -18,13 +18,12 @@ FIT = 60e-6  # [s] of a mini-batch
 SEARCH = 250e-6  # [s] of a network's best action
 NETWORK_STEP = 35e-6  # [s] of a network, at a step, besides
 SOLVE = {"riccati": (12e-6, 4e-6)}  # [s] of a solve, and of each stage of its plan
-SLOW_SOLVE = (0.0, 250e-6)  # of every other solver
 
 
 def seconds_of(experiment: Experiment) -> float:
     """About how long one core takes to train and judge a run [s]."""
     e, entry = experiment, LEARNERS[experiment.learner]
-    once, stage = SOLVE.get(e.solver, SLOW_SOLVE)
+    once, stage = SOLVE.get(e.solver, (0.0, 250e-6))
     each = STEP
     if entry.network:
         read = NETWORKS[e.network]

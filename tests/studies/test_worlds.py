@@ -11,7 +11,7 @@ from nmpcrl.analysis.encounters import crowding, judged
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import worlds_run
 from nmpcrl.studies.worlds import PARTS, WORLDS, back, noticing
-from nmpcrl.studies.worlds_run import TERMINALS, begin, controller
+from nmpcrl.studies.worlds_run import TERMINALS, controller
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.moving import World, frozen, still
@@ -137,7 +137,7 @@ def test_the_cost_with_a_terminal_cost_is_a_share_of_theta_init_s_in_the_same_la
 @pytest.mark.parametrize("terminal", TERMINALS[1:])
 def test_a_richer_terminal_cost_begins_as_the_papers_and_can_become_another(terminal):
     richer, data = controller(terminal), {"centres": np.array(paper.LAYOUTS["A"])}
-    theta, state = begin(richer), np.array([4.0, 1.4, -0.3])
+    theta, state = richer.problem.theta, np.array([4.0, 1.4, -0.3])
     np.testing.assert_array_equal(theta[:9], THETA)
     printed, same = (one.solve(state, each, data=data)
                      for one, each in ((controller(), THETA), (richer, theta)))  # fmt: skip

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.trap import STOOD
 from nmpcrl.course import Outcome, choice, function, number
 from nmpcrl.course.checks.precision import to_places
-from nmpcrl.studies.population import STANDING, STOOD
+from nmpcrl.studies.population import STANDING
 
 
 def gap(answer: Any) -> Outcome:
