@@ -73,7 +73,7 @@ def stands(summary: RunSummary, episodes: Iterable[int]) -> list[Stand]:
 
 
 def stretch(found: Iterable[Stand], standing: float) -> list[Stand]:
-    """The first run of stands in which the robot is away and moves less than `standing` [m]."""
+    """The first consecutive stands away from the target that move less than `standing` [m]."""
     stands_there = dropwhile(lambda one: one.arrived or one.moved >= standing, found)
     return [*takewhile(lambda one: not one.arrived and one.moved < standing, stands_there)]
 

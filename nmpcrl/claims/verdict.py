@@ -93,9 +93,10 @@ class Verdict:
 
     @property
     def turns(self) -> bool:
-        """Whether most pairs that differ go as claimed in one reading, and not in another.
+        """Whether the decay of the noise reverses a claim of two halves.
 
-        "Most" is sure (`rate` above one half) in the one; in the other more go against the claim.
+        With one decay surely more than half of the pairs that differ go as claimed (by `rate`);
+        with another, more pairs go against the claim.
         """
         split = [one for one in self.own_halves if one.apart]
         sure = any(rate(one.as_claimed, one.apart).low > 0.5 for one in split)

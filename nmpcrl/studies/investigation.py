@@ -188,7 +188,7 @@ class Investigation:
         return folder() / f"{self.name}.jsonl"
 
     def _lines(self, of: str = "") -> dict[str, tuple[Row, str]]:
-        """The row of a key, by default of each, and the commit that had registered it before.
+        """The rows whose keys begin with `of`, by key, with the commit that had registered each.
 
         Incomplete lines are skipped, and rows of sources that are not accepted, or of other keys,
         arms, places or seeds.

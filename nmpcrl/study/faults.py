@@ -15,7 +15,7 @@ BASE = 0.5  # [m] between the wheels: the robot's diameter
 
 @dataclass(frozen=True)
 class Fault:
-    """A difference between plant and model; without one the plant has the robot's bits."""
+    """A difference between plant and model; `Fault()` steps as the robot does, to the last bit."""
 
     grip: float = 1.0  #: share of the speed that arrives
     lag: float = 0.0  #: [s], time constant of both inputs, whose state is not measured

@@ -102,7 +102,7 @@ def gros_zanon(plan: Mpc, th: dict[str, Any]) -> Any:
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """Without CasADi's warnings on numpy functions, which mpcrl calls on its arrays."""
+    """Hide CasADi's warnings on numpy functions, which mpcrl calls on its arrays."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)
         yield
