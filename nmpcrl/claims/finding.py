@@ -4,7 +4,7 @@ A gap that the first rollout goes through closes at a theta_c that is known befo
 (`trajectory.closes_at`); the final theta_c of a run of ES or GES only after training.
 """
 
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,8 +20,6 @@ from nmpcrl.study import paper
 
 LEARNERS = ("ES", "GES")  # which fit no network
 EARLY = 20  # episodes
-
-Count: TypeAlias = tuple[int, int]  # yes, of
 
 
 def finding(found: Published) -> "pd.Series[Any]":
@@ -84,7 +82,7 @@ def _by_hand(layout: str) -> dict[str, Any]:
     return {"closes": closes, "saved": saved, "solved": saved >= 0 and arrives}
 
 
-def _stopped(main: pd.DataFrame, decay: str) -> tuple[Count, int]:
+def _stopped(main: pd.DataFrame, decay: str) -> tuple[tuple[int, int], int]:
     """Stopped runs of RDES in one reading, and how many were stopped within `EARLY` episodes."""
     rdes = main[(main.learner == "RDES") & (main.decay == decay)]
     stopped = was_stopped(rdes)

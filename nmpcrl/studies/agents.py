@@ -313,11 +313,6 @@ class Course:
     there: pd.DataFrame  # whether the robot arrives, under every seed, as `shares`
 
     @property
-    def last(self) -> pd.Series:
-        """The shares at the last checkpoint."""
-        return self.shares.iloc[-1]
-
-    @property
     def median(self) -> Vector:
         """The median share over layouts or seeds, at each checkpoint."""
         found: Vector = np.median(self.shares, axis=1)
@@ -337,9 +332,8 @@ class Course:
         yes = self.median <= 1 + TOLERANCE
         last = np.flatnonzero(~yes)
         stays = last[-1] + 1 if last.size else 0
-        episodes = self.shares.index
-        first = float(episodes[int(yes.argmax())]) if yes.any() else np.inf
-        return first, float(episodes[stays]) if stays < len(yes) else np.inf
+        first = float(self.shares.index[int(yes.argmax())]) if yes.any() else np.inf
+        return first, float(self.shares.index[stays]) if stays < len(yes) else np.inf
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -370,23 +364,23 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
 
 
 def _matches(one: Course, _: pd.Series) -> Answer:
-    return share(one.last <= 1 + TOLERANCE, numbers=one.numbers)
+    return share(one.shares.iloc[-1] <= 1 + TOLERANCE, numbers=one.numbers)
 
 
 def _less(one: Course, search: pd.Series) -> Answer:
-    return cheaper((one.last / search.astype(float)).dropna())
+    return cheaper((one.shares.iloc[-1] / search.astype(float)).dropna())
 
 
 # answer of a course and of the costs of the search; part, and some of its layouts
 _ASKED: Mapping[str, tuple[Callable[..., Answer], str, Sequence[str]]] = {
     "matches in 300 episodes": (_matches, "judge", ()),
     "solves in 300 episodes": (lambda one, _: share(
-        (one.last <= 1 + TOLERANCE) & one.there.iloc[-1].astype(bool)), "judge", ()),
+        (one.shares.iloc[-1] <= 1 + TOLERANCE) & one.there.iloc[-1].astype(bool)), "judge", ()),
     "or the best search": (_less, "judge", ()),
     "matches in one layout": (lambda one, _: share(
         one.shares.min() <= 1 + TOLERANCE, "seeds", one.numbers), "one", ()),
     "or the best search in one layout": (lambda one, search: cheaper(  # each seed beside its mean
-        (one.last / search.get("A", np.nan)).dropna(), "seeds"), "one", ()),
+        (one.shares.iloc[-1] / search.get("A", np.nan)).dropna(), "seeds"), "one", ()),
     "matches over the 60": (_matches, "all", [*TUNE]),
     "matches on the 120": (_matches, "all", [*JUDGE]),
     "or the best search on the 120": (_less, "all", [*JUDGE]),
@@ -402,7 +396,7 @@ def _of_agent(
 
 
 def _one_or_other(known: Known) -> Answer:
-    first, second = (course(known[0], "judge", name).last for name in AGENTS)
+    first, second = (course(known[0], "judge", name).shares.iloc[-1] for name in AGENTS)
     return cheaper((first / second).dropna())
 
 

@@ -275,14 +275,22 @@ class Investigation:
     def price(self, part: str) -> tuple[int, int, float]:
         """How many rows a part has, how many are missing, and their processor time [s].
 
-        A `Refusal` if an arm depends on unknown rows.
+        The published arms of earlier epochs take the place of arms that depend on unknown rows; a
+        `Refusal` if there are none.
         """
         known, one = pd.concat([self.made(), self._published()]), self.parts[part]
         known = known[known.part == part]
+        try:
+            rows = [*self.conditions(part)]
+        except Refusal:
+            if known.empty:
+                raise
+            rows = [Condition(part, arm, *at) for arm in {*known.arm} for at in one.order(arm)]
+        made = self._lines()
+        missing = [each.arm for each in rows if self.key(each) not in made]
         means = known.groupby("arm").seconds.mean().dropna() if "seconds" in known else {}
-        missing = self.missing(part)
-        seconds = sum(means.get(each.arm, one.seconds * one.episodes) for each in missing)
-        return len(self.conditions(part)), len(missing), float(seconds)
+        seconds = sum(means.get(arm, one.seconds * one.episodes) for arm in missing)
+        return len(rows), len(missing), float(seconds)
 
     def answers(self, table: pd.DataFrame) -> dict[str, Answer]:
         """The answers of a table to all questions, by name."""

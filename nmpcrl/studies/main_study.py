@@ -124,8 +124,7 @@ def _hours(runs: pd.DataFrame) -> float:
 
 def publish_searches(searches: Mapping[str, SearchResult]) -> Path:
     """Replace the published searches by those of some layouts, with seed 0 and `BUDGET`."""
-    made = {"seed": 0, "budget": BUDGET}
-    rows = [{"layout": one, **made, **asdict(result)} for one, result in searches.items()]
+    rows = [{"layout": n, "seed": 0, "budget": BUDGET} | asdict(one) for n, one in searches.items()]
     return _written(published.SEARCHES, pd.DataFrame(rows), made_here())
 
 

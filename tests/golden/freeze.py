@@ -167,7 +167,7 @@ def courses() -> Any:
     found = {}
     for (part, among), agent in product(asked, agents.AGENTS):
         one = agents.course(trained(), part, agent, among)
-        found[f"{agent}, {part}, {len(one.last)}"] = {
+        found[f"{agent}, {part}, {one.shares.shape[1]}"] = {
             "shares": table(one.shares), "there": table(one.there), "numbers": one.numbers,
             "median": one.median, "interval": one.interval,
         }  # fmt: skip

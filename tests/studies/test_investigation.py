@@ -223,8 +223,9 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay():
     assert [later.is_current(part) for part in parts] == [False, False]
     assert later.known().empty
     assert later.price("tune") == (4, 4, 4 * 7.0)  # of the earlier rows
+    assert later.price("judge") == (3, 3, 3 * 7.0)  # by the published arms
     with pytest.raises(Refusal, match="depends on the part 'tune'"):
-        later.price("judge")
+        later.conditions("judge")
     later.complete(["tune"], workers=1)
     whole = later.log.read_text()
     later.log.write_text(whole[: whole.rindex("\n")])
