@@ -10,13 +10,7 @@ from nmpcrl.claims.verdict import Verdict
 from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 
-WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 SURE = 0.01  # of Fisher's test: what chance explains as rarely is called more than chance
-
-
-def number(count: int) -> str:
-    """A small number as a word."""
-    return WORDS[count] if count < len(WORDS) else f"{count:,}"
 
 
 def depends_on(verdicts: Iterable[Verdict], judged: pd.DataFrame) -> dict[str, tuple[str, ...]]:

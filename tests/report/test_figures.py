@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 import numpy as np
 import pandas as pd
 import pytest
-from builders import evidence_of, summary_of
+from builders import evidence_of
 from legibility import contrast, flaws
 from matplotlib.colors import to_hex
 
@@ -140,9 +140,6 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
         "It ends",
     ),
     learners.on_the_chain: lambda draw: draw(Chain(), 0.1, (0.1, 1.0, 4.0), updates=50),
-    learners.parts_of_tdc: lambda draw: draw(
-        {name: summary_of(Experiment("TDC")) for name in learners.PARTS}
-    ),
     results.learning_curves: lambda draw: draw(
         made(), ("DES", "RDES"), "A", thresholds.divergence, "diverged"
     ),

@@ -10,7 +10,6 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.extrapolation import Outcome
 from nmpcrl.analysis.imitation import Imitation
-from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.learning.updates import OVERSHOOT
@@ -37,7 +36,7 @@ from nmpcrl.report.figures.style import (
     titled,
 )
 from nmpcrl.study import Runs, paper
-from nmpcrl.study.records import LAST, Records
+from nmpcrl.study.records import Records
 
 DASHES = ("-", "--", "-.", ":")
 HUGE = 10.0  # of alpha ||phi||^2
@@ -47,13 +46,6 @@ WATCHED: dict[str, dict[str, Any]] = {  # by the interventions of `analysis.extr
     "true slope": {"label": "true slope", "color": TEAL, "linestyle": "-"},
 }
 SHOWN = (0.05, 100.0)  # of alpha ||phi||^2; what is larger stands at the edge
-PARTS: dict[str, dict[str, Any]] = {  # of TDC, each left out in turn
-    "TDC": {"color": LOOKS["TDC"].color, "linestyle": "-", "linewidth": 2.2},
-    "without h": {"color": LOOKS["TDC"].color, "linestyle": "--"},
-    "not projected": {"color": LOOKS["TDC"].color, "linestyle": ":"},
-    "slow w": {"color": LOOKS["TDC"].color, "linestyle": "-."},
-    "GES": LOOKS["GES"].line,
-}
 
 
 # Numbers of a run by episode.
@@ -265,26 +257,3 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
     right.set(xlabel=r"$\beta / \alpha$ (no unit)", ylabel="spectral radius (no unit)")
     least = grid[radius < 1].min(initial=np.inf)
     return titled(figure, f"Gradient TD converges once β is above {least:.2f} α", legend=left)
-
-
-@page
-def parts_of_tdc(runs: Mapping[str, RunSummary]) -> Drawn:
-    """TDC with each of its parts left out: the noise-free cost, and the size of w.
-
-    Args:
-        runs: by what is in `PARTS`.
-    """
-    figure, (left, right) = subplots(1, 2, 3.3)
-    ends = {}
-    for name, run in runs.items():
-        shares = run.evaluations["cost"] / run.evaluations["cost"][0]
-        left.plot(run.evaluations["episode"], shares, label=name, **PARTS[name])
-        each_episode(right, np.linalg.norm(run.episodes["w"], axis=1), **PARTS[name])
-        ends[name] = shares[-LAST:].mean()  # infinite if a rollout failed
-    left.set(ylabel="noise-free cost / first")
-    right.set(ylabel="size of w (no unit)", yscale="log")
-    for axes in (left, right):
-        over_episodes(axes)
-    moved = ends["without h"] - ends["TDC"]
-    title = f"Without h, the final cost moves by {moved:+.1%} of the first"
-    return titled(figure, title, legend=left)

@@ -1,7 +1,5 @@
 """The live figures of chapters 1, 2 and 4, and of obstacles that move."""
 
-from typing import Any
-
 import numpy as np
 from IPython.display import HTML
 
@@ -36,9 +34,7 @@ def controller(nmpc: Nmpc, theta: Vector, steps: int) -> HTML:
         theta: to begin with, shape (2n + m + 1,).
         steps: of the closed loop.
     """
-    return solving(
-        "controller", nmpc, lambda: begin(nmpc, nmpc.task.start, theta) | {"steps": steps}
-    )
+    return solving("controller", nmpc, begin(nmpc, nmpc.task.start, theta) | {"steps": steps})
 
 
 def gradient(nmpc: Nmpc, state: Vector, theta: Vector, steps: Vector) -> HTML:
@@ -51,10 +47,8 @@ def gradient(nmpc: Nmpc, state: Vector, theta: Vector, steps: Vector) -> HTML:
         steps: of the differences, growing, shape (k,).
     """
 
-    def data() -> dict[str, Any]:
-        return begin(nmpc, state, theta) | {"steps": steps.tolist(), "step": len(steps) // 2}
-
-    return solving("gradient", nmpc, data)
+    given = {"steps": steps.tolist(), "step": len(steps) // 2}
+    return solving("gradient", nmpc, begin(nmpc, state, theta) | given)
 
 
 def chain(alpha: float, beta: float, gamma: float, *, updates: int = 120) -> HTML:
@@ -67,23 +61,19 @@ def chain(alpha: float, beta: float, gamma: float, *, updates: int = 120) -> HTM
         updates: how many are shown.
     """
     nmpc = paper.nmpc("A")  # the module has a controller's update rules
-    given = {"alpha": alpha, "beta": beta, "gamma": gamma, "states": "first", "at": 0}
-
-    def data() -> dict[str, Any]:
-        return {
-            "given": given,
-            "updates": updates,
-            "problem": problem_of(nmpc),
-            "ranges": RANGES,
-            "limits": LIMITS,
-            "theta": 1.0,
-            "w": 0.0,
-            "phi": two_state.PHI.tolist(),
-            "phi_next": two_state.PHI_NEXT.tolist(),
-            "cost": two_state.COST,
-            "looks": {learner: look(learner) for learner in ("ES", "GES")},
-        }
-
+    data = {
+        "given": {"alpha": alpha, "beta": beta, "gamma": gamma, "states": "first", "at": 0},
+        "updates": updates,
+        "problem": problem_of(nmpc),
+        "ranges": RANGES,
+        "limits": LIMITS,
+        "theta": 1.0,
+        "w": 0.0,
+        "phi": two_state.PHI.tolist(),
+        "phi_next": two_state.PHI_NEXT.tolist(),
+        "cost": two_state.COST,
+        "looks": {learner: look(learner) for learner in ("ES", "GES")},
+    }
     return solving("chain", nmpc, data)
 
 
@@ -96,14 +86,11 @@ def moving(theta: Vector | None = None) -> HTML:
     theta = np.array(paper.THETA_INIT) if theta is None else theta
     nmpc = paper.controller(paper.task(tuple(one.centre for one in SCENE)))
     planned = problem(len(SCENE))
-
-    def data() -> dict[str, Any]:
-        return begin(nmpc, nmpc.task.start, theta) | {
-            "planning": browser.problem(planned),
-            "movers": [[*one.centre, *one.velocity] for one in SCENE],
-            "period": PERIOD,
-            "step": BEGIN,
-            "looks": ROBOTS,
-        }
-
+    data = begin(nmpc, nmpc.task.start, theta) | {
+        "planning": browser.problem(planned),
+        "movers": [[*one.centre, *one.velocity] for one in SCENE],
+        "period": PERIOD,
+        "step": BEGIN,
+        "looks": ROBOTS,
+    }
     return solving("moving", nmpc, data, problem=planned)

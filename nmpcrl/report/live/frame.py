@@ -4,7 +4,7 @@ import gzip
 import json
 import os
 from base64 import b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ FILE = '<{kind} data-file="{name}">\n{text}\n</{kind}>'
 def solving(
     name: str,
     nmpc: Nmpc,
-    data: Callable[[], Mapping[str, Any]],
+    data: Mapping[str, Any],
     *scripts: str,
     problem: Problem | None = None,
 ) -> HTML:
@@ -37,7 +37,7 @@ def solving(
     Args:
         name: of its script without .js.
         nmpc: whose plant and task are compiled, as `nmpcrl.module` of the page.
-        data: makes what the script is given.
+        data: what the script is given.
         scripts: that its own needs besides `SHARED`.
         problem: what it solves besides, as `nmpcrl.problem_module`.
     """
@@ -58,7 +58,7 @@ def solving(
         texts[file] = (here / file).read_text("utf-8")
     kinds = {file: "style" if file == STYLE else "script" for file in texts}
     files = [FILE.format(kind=kinds[one], name=one, text=texts[one].strip()) for one in texts]
-    return HTML("\n".join([FIGURE.format(name, json.dumps(data())), *files]))  # type: ignore[no-untyped-call]
+    return HTML("\n".join([FIGURE.format(name, json.dumps(data)), *files]))  # type: ignore[no-untyped-call]
 
 
 def _absent(why: object) -> HTML:

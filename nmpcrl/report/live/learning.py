@@ -49,18 +49,16 @@ def intro() -> HTML:
         "target": nmpc.task.target.tolist(),
     }
 
-    def data() -> dict[str, Any]:
-        begun = begin(nmpc, nmpc.task.start, np.array(experiment.theta))
-        left, _, width, _ = begun["view"]
-        _, y, clearance = np.hstack([task.discs for task in tasks.values()])
-        bottom, top = (y - clearance / 2).min(), (y + clearance / 2).max()
-        return begun | {
-            "view": [left, bottom, width, top - bottom],
-            "layouts": {name: discs(task) for name, task in tasks.items()},
-            "arrived": ARRIVED,
-            "settings": settings,
-        }
-
+    begun = begin(nmpc, nmpc.task.start, np.array(experiment.theta))
+    left, _, width, _ = begun["view"]
+    _, y, clearance = np.hstack([task.discs for task in tasks.values()])
+    bottom, top = (y - clearance / 2).min(), (y + clearance / 2).max()
+    data = begun | {
+        "view": [left, bottom, width, top - bottom],
+        "layouts": {name: discs(task) for name, task in tasks.items()},
+        "arrived": ARRIVED,
+        "settings": settings,
+    }
     return solving("intro", nmpc, data, "learning.js")
 
 
@@ -70,28 +68,26 @@ def laboratory() -> HTML:
     (left, bottom), (right, top) = box = [paper.LOWER[:2], paper.UPPER[:2]]
     disc, robot = Obstacle(0.0, 0.0).diameter, nmpc.task.robot_diameter
 
-    def data() -> dict[str, Any]:
-        return FIXED | {
-            "problem": problem_of(nmpc, LONGEST),
-            "fields": [setting(name) for name in SETTINGS],
-            "layouts": paper.LAYOUTS,
-            "start": paper.START,
-            "target": paper.TARGET,
-            "theta": paper.THETA_INIT,
-            "names": paper.THETA_NAMES,
-            "theta_set": paper.THETA_SET,
-            "evaluate_every": Experiment().evaluate_every,
-            "last": LAST,
-            "overshoot": OVERSHOOT,
-            "most": MOST_OBSTACLES,
-            "radius": disc / 2,
-            "clearance": disc + robot,
-            "robot": robot / 2,
-            "box": box,
-            "view": [left - WALL, bottom - WALL, right - left + 2 * WALL, top - bottom + 2 * WALL],
-            "looks": {learner: look(learner) for learner in LEARNERS},
-        }
-
+    data = FIXED | {
+        "problem": problem_of(nmpc, LONGEST),
+        "fields": [setting(name) for name in SETTINGS],
+        "layouts": paper.LAYOUTS,
+        "start": paper.START,
+        "target": paper.TARGET,
+        "theta": paper.THETA_INIT,
+        "names": paper.THETA_NAMES,
+        "theta_set": paper.THETA_SET,
+        "evaluate_every": Experiment().evaluate_every,
+        "last": LAST,
+        "overshoot": OVERSHOOT,
+        "most": MOST_OBSTACLES,
+        "radius": disc / 2,
+        "clearance": disc + robot,
+        "robot": robot / 2,
+        "box": box,
+        "view": [left - WALL, bottom - WALL, right - left + 2 * WALL, top - bottom + 2 * WALL],
+        "looks": {learner: look(learner) for learner in LEARNERS},
+    }
     return solving("laboratory", nmpc, data, "learning.js")
 
 

@@ -16,7 +16,6 @@ from IPython.display import HTML
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published
 from nmpcrl.claims.published import FOLLOWED, Published
-from nmpcrl.control import Nmpc
 from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
 from nmpcrl.report.live.frame import solving
 from nmpcrl.report.live.problem import discs, look, problem_of, surroundings
@@ -33,14 +32,9 @@ LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
 
 def runs(*learners: str) -> HTML:
     """Published runs beside the baseline without learning; the first two learners are shown."""
-    nmpc = paper.nmpc(LAYOUT)
-    return solving("runs", nmpc, lambda: _data(nmpc, learners))
-
-
-def _data(nmpc: Nmpc, learners: tuple[str, ...]) -> dict[str, Any]:
-    known = published.load()
+    nmpc, known = paper.nmpc(LAYOUT), published.load()
     tasks = {name: paper.task(name) for name in LAYOUTS}
-    return {
+    data = {
         "looks": {name: look(name) for name in (*learners, "frozen")},
         "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
         "layouts": {name: discs(task) for name, task in tasks.items()},
@@ -55,6 +49,7 @@ def _data(nmpc: Nmpc, learners: tuple[str, ...]) -> dict[str, Any]:
         "problem": problem_of(nmpc),
         **surroundings(*tasks.values()),
     }
+    return solving("runs", nmpc, data)
 
 
 def scripts() -> dict[str, str]:
