@@ -96,7 +96,10 @@ def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -
     rows = {}
     for one in answers:
         asked = questions[one.question]
-        counts = [_share_of(name, *count) for name, count in one.counts.items()]
+        counts = [  # with Wilson's interval, as if they were independent
+            f"{yes} of {of} {name}" + (f": {rate(yes, of):.0%}" if of else "")
+            for name, (yes, of) in one.counts.items()
+        ]
         counts += [f"{yes} of {of} {name}" for name, (yes, of) in one.beside.items()]
         counts += [f"{name} {number:.3g}" for name, number in one.numbers.items()]
         rows[asked.name] = {
@@ -106,11 +109,6 @@ def answer_table(answers: Iterable[Answer], questions: Mapping[str, Question]) -
             "evidence": "; ".join(counts),
         }
     return shown(pd.DataFrame.from_dict(rows, "index"))
-
-
-def _share_of(name: str, yes: int, of: int) -> str:
-    """What was counted, with Wilson's interval as if it were independent."""
-    return f"{yes} of {of} {name}" + (f": {rate(yes, of):.0%}" if of else "")
 
 
 def verdict_map(judged: pd.DataFrame) -> str:
@@ -197,13 +195,9 @@ def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
 
 
 def _outcome(verdict: Verdict, source: str = PUBLISHED) -> str:
-    """What became of a claim, and the number on which that rests."""
-    return f"{_labelled(verdict)}{_share(verdict, source)}"
-
-
-def _labelled(verdict: Verdict) -> str:
-    """What is said of a claim, in the colour of those words or else of its outcome."""
-    return badge(verdict.words, verdict.words if verdict.words in BADGES else verdict.outcome)
+    """What became of a claim, in the colour of those words or its outcome, and its number."""
+    key = verdict.words if verdict.words in BADGES else verdict.outcome
+    return f"{badge(verdict.words, key)}{_share(verdict, source)}"
 
 
 def _aside(verdict: Verdict) -> str:

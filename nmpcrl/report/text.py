@@ -30,14 +30,10 @@ def depends_on(verdicts: Iterable[Verdict], judged: pd.DataFrame) -> dict[str, t
 
 def judged(verdict: Verdict) -> str:
     """A claim, and what became of it, in a sentence of Markdown that links to what it rests on."""
-    return f"{audit_link(verdict.claim)} (*{verdict.statement.rstrip('.')}*): **{verdict.words}**."
-
-
-def audit_link(claim: str) -> str:
-    """A link from a claim's name to its thresholds, counts and evidence, in Markdown."""
-    name = WIDER_THAN.get(claim, claim)
+    name = WIDER_THAN.get(verdict.claim, verdict.claim)
     label = name.lower() if name in CLAIMS else "own"
-    return f"[{claim}](evidence.ipynb#evidence-{label})"
+    link = f"[{verdict.claim}](evidence.ipynb#evidence-{label})"
+    return f"{link} (*{verdict.statement.rstrip('.')}*): **{verdict.words}**."
 
 
 def departure_link(words: str, letter: str) -> str:

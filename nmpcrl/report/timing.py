@@ -9,8 +9,6 @@ from nmpcrl.bench import learners
 from nmpcrl.bench.saving import saving
 from nmpcrl.report.cited import Cited
 
-PUBLISHED = "the published measurement"
-
 
 def measured_on(about: Mapping[str, Any]) -> str:
     """The machine and the day of a measurement; `about` as `published` says it."""
@@ -18,21 +16,20 @@ def measured_on(about: Mapping[str, Any]) -> str:
     return f"{machine['cores']} cores ({machine['processor']}, {about['date']})"
 
 
-def to_es(timings: pd.DataFrame, solver: str, learner: str, source: str = PUBLISHED) -> Cited:
-    """The measured time of a step of a learner over one of ES, with its 95 % interval.
+def to_es(timings: pd.DataFrame, solver: str, learner: str) -> Cited:
+    """The published time of a step of a learner over one of ES, with its 95 % interval.
 
     Args:
         timings: of `time_learners`.
         solver: name of both's.
         learner: name.
-        source: where the times come from.
     """
-    return Cited(learners.ratio(timings, solver, learner), of_steps(learner, solver, source))
+    return Cited(learners.ratio(timings, solver, learner), of_steps(learner, solver))
 
 
-def of_steps(learner: str, solver: str, source: str = PUBLISHED) -> str:
+def of_steps(learner: str, solver: str) -> str:
     """The quantity of that ratio; see `cited`."""
-    return f"step of {learner} in steps of ES, with {solver}: {source}"
+    return f"step of {learner} in steps of ES, with {solver}: the published measurement"
 
 
 def ratios_at_paper_speed(timings: pd.DataFrame) -> tuple[float, float]:

@@ -46,7 +46,6 @@ def panels(
     names: Sequence[str],
     row: float,
     rest: float,
-    columns: int = 2,
     labels: tuple[str, str] = ("x [m]", "y [m]"),
     **share: bool,
 ) -> tuple[Drawn, dict[str, Axes]]:
@@ -56,14 +55,13 @@ def panels(
         names: of what is drawn.
         row: height of a row [inches].
         rest: height of what stands above and below the rows [inches].
-        columns: at most.
         labels: of the axes below and on the left.
         share: `sharex` or `sharey`, if panels have scales of their own.
 
     Returns:
         The figure, and the panel of each name.
     """
-    columns = min(columns, len(names))
+    columns = min(2, len(names))
     high = -(-len(names) // columns)
     options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False} | share
     figure, grid = subplots(high, columns, row * high + rest, **options)
@@ -96,7 +94,6 @@ def by_decay(
     learners: Iterable[str],
     measure: Callable[[Records], Vector],
     ylabel: str,
-    height: float = 3.2,
 ) -> tuple[Drawn, Any]:
     """One line a run over the episodes, and a panel for each decay of the noise.
 
@@ -105,10 +102,9 @@ def by_decay(
         learners: which are drawn.
         measure: one number an episode of a run.
         ylabel: what it is.
-        height: of the figure [inches].
     """
     decays = runs.values_of("decay")
-    figure, axes = subplots(1, len(decays), height, sharey=True, squeeze=False)
+    figure, axes = subplots(1, len(decays), sharey=True, squeeze=False)
     for panel, decay in zip(axes[0], decays, strict=True):
         for learner in learners:
             for records in runs.select(learner=learner, decay=decay).values():

@@ -167,8 +167,9 @@ def literal_and_gated(literal: Records, gated: Records) -> Drawn:
 
 
 @page
-def online(runs: Runs[Records], learners: tuple[str, ...] = ("DES", "RDES")) -> Drawn:
+def online(runs: Runs[Records]) -> Drawn:
     """The error of the next value while learning, one panel a decay of the noise."""
+    learners = ("DES", "RDES")
     figure, panels = by_decay(runs, learners, online_errors, "error of the\nnext value [cost]")
     panels[0].set_yscale("log")
     last = {}

@@ -117,7 +117,12 @@ def learning_curves(
         row[0].yaxis.set_minor_locator(NullLocator())
         row[0].yaxis.set_major_formatter("{x:g}")
         if most > CEILING:
-            _to_the_ceiling(row)
+            for axes in row:
+                axes.axhspan(STRIP[0], STRIP[2], **BAND)
+                where: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
+                axes.text(0.01, STRIP[1], f"> {CEILING:g}", fontsize="small", **where)
+            row[0].set_ylim(None, STRIP[2])
+            row[0].yaxis.set_major_locator(FixedLocator([*range(1, int(CEILING) + 1)]))
         row[0].set_ylabel(label)
     for axes in grid[-1]:
         axes.set_xlabel("episode")
@@ -134,16 +139,6 @@ def _costs(axes: Axes, along: Vector, costs: Any, learner: str) -> None:
     axes.fill_between(along, *ends, color=look.color, alpha=0.12, lw=0)
     # between a run that is off the scale and one that is not there is nothing
     middle_half(axes, along, seen, look.color, "higher", linestyle=look.linestyle)
-
-
-def _to_the_ceiling(row: Sequence[Axes]) -> None:
-    """Panels that share an axis of cost, with the strip of what lies above it."""
-    for axes in row:
-        axes.axhspan(STRIP[0], STRIP[2], **BAND)
-        where: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
-        axes.text(0.01, STRIP[1], f"> {CEILING:g}", fontsize="small", **where)
-    row[0].set_ylim(None, STRIP[2])
-    row[0].yaxis.set_major_locator(FixedLocator([*range(1, int(CEILING) + 1)]))
 
 
 @page

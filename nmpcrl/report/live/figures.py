@@ -51,19 +51,18 @@ def gradient(nmpc: Nmpc, state: Vector, theta: Vector, steps: Vector) -> HTML:
     return solving("gradient", nmpc, begin(nmpc, state, theta) | given)
 
 
-def chain(alpha: float, beta: float, gamma: float, *, updates: int = 120) -> HTML:
+def chain(alpha: float, beta: float, gamma: float) -> HTML:
     """Semi-gradient and gradient TD on the chain of two states, whose step sizes can be moved.
 
     Args:
         alpha: step size of theta, to begin with.
         beta: step size of w.
         gamma: discount.
-        updates: how many are shown.
     """
     nmpc = paper.nmpc("A")  # the module has a controller's update rules
     data = {
         "given": {"alpha": alpha, "beta": beta, "gamma": gamma, "states": "first", "at": 0},
-        "updates": updates,
+        "updates": 120,  # shown
         "problem": problem_of(nmpc),
         "ranges": RANGES,
         "limits": LIMITS,
@@ -77,13 +76,9 @@ def chain(alpha: float, beta: float, gamma: float, *, updates: int = 120) -> HTM
     return solving("chain", nmpc, data)
 
 
-def moving(theta: Vector | None = None) -> HTML:
-    """Obstacles with a velocity that can be dragged, and two robots that plan among them.
-
-    Args:
-        theta: of both, to begin with; that of the paper if absent.
-    """
-    theta = np.array(paper.THETA_INIT) if theta is None else theta
+def moving() -> HTML:
+    """Obstacles with a velocity that can be dragged, and two robots that plan among them."""
+    theta = np.array(paper.THETA_INIT)
     nmpc = paper.controller(paper.task(tuple(one.centre for one in SCENE)))
     planned = problem(len(SCENE))
     data = begin(nmpc, nmpc.task.start, theta) | {
