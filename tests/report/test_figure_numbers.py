@@ -103,7 +103,7 @@ def test_a_pair_that_is_apart_and_a_run_that_touches_are_drawn_above_the_thresho
 
 def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stopped():
     found = made_up(lambda e: {"reached": 40} if e.learner == "DES" and e.seed == 0 else {})
-    curves = {one.get_label(): one.get_ydata() for one in claims.learners(found, "").axes[1].lines}
+    curves = {one.get_label(): one.get_ydata() for one in claims.learners(found, "").axes[0].lines}
     assert (curves["ES"][0], curves["DES"][0]) == (1.0, 1 - 1 / SEEDS)
     for curve in curves.values():
         assert (np.diff(curve) <= 0).all()

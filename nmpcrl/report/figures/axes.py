@@ -121,12 +121,11 @@ def plain(axis: Axis) -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callable[[Any], Any]:
-    """Make the "x" or "y" axis logarithmic, with a grey strip at its end for what is infinite.
+def logarithmic(axes: Axes, values: Vector, border: float) -> Callable[[Any], Any]:
+    """Make the vertical axis logarithmic, with a grey strip at its end for what is infinite.
 
     Args:
-        axis: whose axis it is.
-        which: "x" or "y".
+        axes: whose axis it is.
         values: all that will be drawn.
         border: a threshold that is to be seen as well.
 
@@ -138,17 +137,12 @@ def logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callab
     low = min(*finite, high / LEAST)
     room = (high / low) ** 0.06
     start, middle, stop = high * room ** np.array([1, 2, 3])
-    axis.set(**{f"{which}scale": "log", f"{which}lim": (low / room, stop)})
-    if which == "x":
-        axis.axvspan(start, stop, **BAND)
-        axis.text(middle, 0.01, "∞", transform=axis.get_xaxis_transform(), ha="center")
-    else:
-        axis.axhspan(start, stop, **BAND)
-        axis.text(0.01, middle, "∞", transform=axis.get_yaxis_transform(), va="center")
-    ticks = {"x": axis.xaxis, "y": axis.yaxis}[which]
+    axes.set(yscale="log", ylim=(low / room, stop))
+    axes.axhspan(start, stop, **BAND)
+    axes.text(0.01, middle, "∞", transform=axes.get_yaxis_transform(), va="center")
     if high / low < FEW:
-        plain(ticks)
-    ticks.set_minor_formatter(NullFormatter())
+        plain(axes.yaxis)
+    axes.yaxis.set_minor_formatter(NullFormatter())
     return lambda drawn: np.clip(np.nan_to_num(drawn, nan=np.inf), low, middle)
 
 

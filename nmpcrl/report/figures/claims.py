@@ -11,16 +11,14 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from nmpcrl.analysis.statistics import interquartile_mean, rate
+from nmpcrl.analysis.statistics import rate
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, rule, thresholds
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.verdict import Assumption, Verdict
 from nmpcrl.report.figures.axes import (
-    entries,
     interval,
-    jitter,
     logarithmic,
     over_episodes,
     rows,
@@ -71,7 +69,7 @@ def measured(found: Evidence, verdict: Verdict) -> Drawn:
     if verdict.claim == "C9":
         values, border, label = 1 - values, 1 - border, "noise-free cost, end / start"
     figure, (axes, panel) = subplots(1, 2, 3.7, width_ratios=(2.6, 1))
-    placed = logarithmic(axes, "y", values.to_numpy(float).ravel(), border)
+    placed = logarithmic(axes, values.to_numpy(float).ravel(), border)
     kinds = strips(axes, values, placed)
     axes.axhline(border, **LIMIT)
     axes.set_ylabel(fill(label, 24))
@@ -132,31 +130,21 @@ def theorem(
 
 @page
 def learners(found: Evidence, finding: str) -> Drawn:
-    """All learners: interquartile mean of the final cost, and how many runs save how much.
+    """All learners: how many runs reduce the cost by how much.
 
     A run that had to be stopped left no policy, so that its cost is infinite.
     """
-    figure, (middles, profile) = subplots(2, 1, 5.4)
+    figure, axes = subplots()
     runs = found.runs
     costs = runs.final_cost.where(runs.stopped == Stopped.FINISHED, np.inf) / runs.initial_cost
-    placed = logarithmic(middles, "x", costs.to_numpy(float), 1.0)
-    names = found.summaries.values_of("learner")
-    for row, name in enumerate(names):
-        look, mine = LOOKS[name], costs[runs.learner == name].to_numpy(float)
-        mean = interquartile_mean(mine, list(runs.layout[runs.learner == name]))
-        middles.plot(placed(mine), row + jitter(len(mine), 0.25), ".", color=look.color, alpha=0.25)
-        middles.plot(placed([mean.low, mean.high]), [row, row], color="black", linewidth=2.2)
-        middles.plot(placed(mean.value), row, look.marker, color=look.color, mec="black")
+    for name in found.summaries.values_of("learner"):
+        mine = costs[runs.learner == name].to_numpy(float)
         reached = [np.mean(1 - mine >= share) for share in PROFILED]
-        profile.plot(PROFILED, reached, label=name, **look.line)
-    rows(middles, names)
-    middles.axvline(1, **AT_ONE)
-    middles.set_xlabel("noise-free cost, end / start")
-    profile.set(
-        xlabel="reduction of the noise-free cost, at least", ylabel="share of runs", ylim=(0, 1)
-    )
-    profile.xaxis.set_major_formatter("{x:.0%}")
-    return titled(figure, finding, found.mark, entries(names))
+        axes.plot(PROFILED, reached, label=name, **LOOKS[name].line)
+    axes.set(xlabel="reduction of the noise-free cost, at least", ylabel="share of runs")
+    axes.set_ylim(0, 1)
+    axes.xaxis.set_major_formatter("{x:.0%}")
+    return titled(figure, finding, found.mark, axes)
 
 
 def _shares(axes: Axes, verdict: Verdict) -> None:
