@@ -11,13 +11,12 @@ from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS
 from nmpcrl.claims.rule import Observations
 from nmpcrl.report.figures import (
     claims,
+    comparisons,
     controller,
     layouts,
-    remedies,
     results,
     speed,
     trials,
-    worlds,
 )
 from nmpcrl.report.figures.style import LOOKS, TEAL
 from nmpcrl.studies.remedies import ADVISED
@@ -241,15 +240,15 @@ def test_layouts_of_the_cliffs_are_read_in_order_with_their_two_lines():
 def test_a_share_beyond_the_axis_is_an_arrow_at_its_edge():
     gain = [Estimate(-np.inf, -np.inf, -0.2), Estimate(0.8, 0.7, 0.9)]
     rows = {"entry": ["DPG", "grid"], "word": ["never", "first"], "part": ADVISED[0], "gain": gain}
-    lines = remedies.gains(pd.DataFrame(rows), "").axes[0].get_lines()
+    lines = comparisons.gains(pd.DataFrame(rows), "").axes[0].get_lines()
     marks = {line.get_marker(): line.get_xdata()[0] for line in lines if len(line.get_xdata()) == 1}
-    assert marks == {"<": remedies.LEAST, "o": 0.8}
+    assert marks == {"<": comparisons.LEAST, "o": 0.8}
 
 
 def test_what_did_not_end_at_the_target_is_crossed_out():
     there = np.linspace(paper.START, paper.TARGET, 30)
-    ways = dict.fromkeys(remedies.WAYS, there)
-    figure = remedies.trajectories({"A": ways, "B": ways | {"learned": there[:15]}})
+    ways = dict.fromkeys(comparisons.WAYS, there)
+    figure = comparisons.trajectories({"A": ways, "B": ways | {"learned": there[:15]}})
     crosses = [sum(line.get_marker() == "X" for line in axes.lines) for axes in figure.axes[:2]]
     assert crosses == [0, 1]
     assert "arrives in 1 of 2 layouts after learning, in 2 " in figure.finding
@@ -257,12 +256,12 @@ def test_what_did_not_end_at_the_target_is_crossed_out():
 
 def test_a_world_that_changes_is_drawn_by_the_median_of_its_runs_and_quartiles_that_are_runs():
     ends = [0.8, 0.9, 1.2, 1.3]
-    shares = {arm: [np.linspace(1, end, 60) for end in ends] for arm in worlds.ARMS}
-    panel = worlds.shifts(shares, 150).axes[0]
+    shares = {arm: [np.linspace(1, end, 60) for end in ends] for arm in comparisons.ARMS}
+    panel = comparisons.shifts(shares, 150).axes[0]
     assert panel.get_lines()[2].get_xydata()[-1] == pytest.approx([300, np.median(ends)])
     band = panel.collections[0].get_paths()[0].vertices[:, 1]
     assert (band.min(), band.max()) == pytest.approx((0.8, 1.2))
-    assert "costs 105% of replanning" in worlds.shifts(shares, 150).finding
+    assert "costs 105% of replanning" in comparisons.shifts(shares, 150).finding
 
 
 def test_the_infinite_cost_of_a_lost_run_is_not_drawn():

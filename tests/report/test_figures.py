@@ -27,15 +27,14 @@ from nmpcrl.report import worlds as report
 from nmpcrl.report.drawn import at_the_gap
 from nmpcrl.report.figures import (
     claims,
+    comparisons,
     controller,
     layouts,
     learners,
-    remedies,
     results,
     speed,
     style,
     trials,
-    worlds,
 )
 from nmpcrl.report.figures.run import run_page
 from nmpcrl.report.trace import trace
@@ -167,15 +166,15 @@ FIGURES: dict[Callable, Callable] = {  # each drawing function, and how it is ca
     layouts.cliffs: lambda draw: draw(
         GRID, dict.fromkeys(LAYOUTS, (4000 + GRID, 4100 + GRID)), LAYOUTS, "Up"
     ),
-    remedies.gains: lambda draw: draw(advice.advice(advice.REMEDIES.table()), "It gains"),
-    remedies.trajectories: lambda draw: draw(
-        {name: dict.fromkeys(remedies.WAYS, WAY) | {"init": FAILS} for name in paper.LAYOUTS}
+    comparisons.gains: lambda draw: draw(advice.advice(advice.REMEDIES.table()), "It gains"),
+    comparisons.trajectories: lambda draw: draw(
+        {name: dict.fromkeys(comparisons.WAYS, WAY) | {"init": FAILS} for name in paper.LAYOUTS}
     ),
-    worlds.models: lambda draw: draw(report.saved(changing.WORLDS.table())),
-    worlds.shifts: lambda draw: draw(dict.fromkeys(worlds.ARMS, [np.ones(60)] * 4), 150),
-    worlds.views: lambda draw: draw(
+    comparisons.models: lambda draw: draw(report.saved(changing.WORLDS.table())),
+    comparisons.shifts: lambda draw: draw(dict.fromkeys(comparisons.ARMS, [np.ones(60)] * 4), 150),
+    comparisons.views: lambda draw: draw(
         (Straight((3.0, 3.0), (0.0, -0.1)), Straight((5.0, 1.0), (0.1, 0.0))),
-        {view: Encounters(WAY, 4000.0, Contacts(7, 1), True) for view in worlds.SEEN},
+        {view: Encounters(WAY, 4000.0, Contacts(7, 1), True) for view in comparisons.SEEN},
     ),
     trials.costs: lambda draw: draw(
         pd.DataFrame([{"learner": name, "seed": 0, "episode": k, "cost": 9.0 - k}

@@ -17,7 +17,6 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocato
 from nmpcrl import Vector
 from nmpcrl.control import Task
 from nmpcrl.report.figures.style import BAND, DECAY_TITLES, INK, LOOKS, Drawn, subplots
-from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
@@ -90,9 +89,9 @@ def each_episode(axes: Axes, values: Vector, **look: Any) -> None:
 
 
 def by_decay(
-    runs: Runs[Records],
+    runs: Runs[Any],
     learners: Iterable[str],
-    measure: Callable[[Records], Vector],
+    measure: Callable[[Any], Vector],
     ylabel: str,
 ) -> tuple[Drawn, Any]:
     """One line a run over the episodes, and a panel for each decay of the noise.
@@ -107,8 +106,8 @@ def by_decay(
     figure, axes = subplots(1, len(decays), sharey=True, squeeze=False)
     for panel, decay in zip(axes[0], decays, strict=True):
         for learner in learners:
-            for records in runs.select(learner=learner, decay=decay).values():
-                each_episode(panel, measure(records), lw=1.2, **LOOKS[learner].line)
+            for run in runs.select(learner=learner, decay=decay).values():
+                each_episode(panel, measure(run), lw=1.2, **LOOKS[learner].line)
         over_episodes(panel, decay)
     axes[0, 0].set_ylabel(ylabel)
     return figure, axes[0]

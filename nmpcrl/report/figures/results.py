@@ -15,6 +15,7 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism
 from nmpcrl.claims.published import Evidence
 from nmpcrl.report.figures.axes import (
+    by_decay,
     draw_task,
     each_episode,
     entries,
@@ -35,7 +36,7 @@ from nmpcrl.report.figures.style import (
     subplots,
     titled,
 )
-from nmpcrl.study import paper
+from nmpcrl.study import Runs, paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Stopped
 
@@ -274,20 +275,16 @@ def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: flo
         solvers: the same of riccati and Ipopt.
         start: how far apart the perturbed begin.
     """
-    decays = tuple(dict.fromkeys(e.decay for e in perturbed))
-    figure, axes = subplots(1, len(decays), 3.4, sharex=True, sharey=True, squeeze=False)
+    runs = Runs({**perturbed})
+    learners = runs.values_of("learner")
+    figure, panels = by_decay(runs, learners, np.asarray, "largest difference in θ")
+    for axes in panels:
+        axes.axhline(start, **LIMIT)
+        axes.xaxis.set_major_locator(MaxNLocator(3, integer=True))
     other: dict[str, Any] = {"color": "0.45", "linewidth": 2.4}
-    for axis, decay in zip(axes[0], decays, strict=True):
-        for experiment, apart in perturbed.items():
-            if experiment.decay == decay:
-                each_episode(axis, apart, **LOOKS[experiment.learner].line)
-        axis.axhline(start, **LIMIT)
-        over_episodes(axis, decay)
-        axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
-    each_episode(axes[0, 0], solvers, **other)
-    axes[0, 0].set(ylabel="largest difference in θ", yscale="log")
-    learners = entries(dict.fromkeys(experiment.learner for experiment in perturbed))
+    each_episode(panels[0], solvers, **other)
+    panels[0].set_yscale("log")
     by_solver = Line2D([], [], label="ES, riccati and Ipopt", **other)
     grown = sum(apart[-1] > start for apart in perturbed.values())
     title = f"A difference of {start:.0e} grows in {grown} of {len(perturbed)} runs"
-    return titled(figure, title, legend=[*learners, by_solver])
+    return titled(figure, title, legend=[*entries(learners), by_solver])
