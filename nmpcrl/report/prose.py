@@ -1,8 +1,9 @@
 """Prose with numbers, and the library's own source, as Markdown that every notebook shows."""
 
+import ast
 import inspect
 import re
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from textwrap import dedent
 from typing import Any
@@ -88,14 +89,22 @@ def listing(shown: Any) -> str:
     """The file in which a function or class is defined, and its definition there, in Markdown.
 
     Args:
-        shown: it, or "module:name" of one that the library compiles.
+        shown: it, or "module:name" of one that only exists compiled.
+
+    Raises:
+        NameError: the module defines no such name.
     """
-    if isinstance(shown, str):
-        module, _, name = shown.partition(":")
-        shown = getattr(import_module(module), name)
-    shown = getattr(shown, "py_func", shown)
-    path = Path(inspect.getfile(inspect.unwrap(shown))).relative_to(ROOT).as_posix()
-    return f"`{path}`\n\n```python\n{dedent(inspect.getsource(shown)).rstrip()}\n```"
+    of = shown if isinstance(shown, str) else f"{shown.__module__}:{shown.__qualname__}"
+    module, _, name = of.partition(":")
+    path = Path(str(find_spec(module).origin))  # type: ignore[union-attr]
+    found: Any = ast.parse(text := path.read_text("utf-8"))
+    for outer in name.split("."):
+        found = next((one for one in found.body if getattr(one, "name", "") == outer), None)
+        if found is None:
+            raise NameError(f"{module} does not define {name}")
+    first = min(one.lineno for one in (found, *found.decorator_list))
+    lines = dedent("\n".join(text.splitlines()[first - 1 : found.end_lineno]))
+    return f"`{path.relative_to(ROOT).as_posix()}`\n\n```python\n{lines}\n```"
 
 
 def folded(text: str, title: str) -> str:
