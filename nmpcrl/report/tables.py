@@ -50,7 +50,7 @@ def shown(frame: pd.DataFrame, caption: str = "", *, escape: bool = True) -> str
     """
     with pd.option_context("display.max_colwidth", None, "display.max_rows", None):
         html = frame.to_html(border=0, escape=escape, classes="table words")
-    html = re.sub(r"<(t[hd])>", r'<\1 style="text-align: left">', html)
+    html = re.sub(r"<(t[hd])\b([^>]*)>", r'<\1\2 style="text-align: left">', html)
     return (
         html.replace("<thead>", f"<caption>{_text(caption)}</caption><thead>") if caption else html
     )
