@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.studies.worlds_run import begin, controller
+from nmpcrl.studies.worlds_run import controller
 from nmpcrl.study.faults import BASE, FAULTS, NONE, Fault, robot
 from nmpcrl.study.moving import World, still
 from nmpcrl.study.parameters import ParameterError
@@ -77,7 +77,7 @@ def test_an_oracle_s_model_is_the_plant():
     fault, nmpc = Fault(grip=0.8, bias=0.15, drift=(0.02, 0.08)), controller("model")
     e = nmpc.problem.expressions
     model = ca.Function("model", [e.x, e.u, e.theta, e.d], [e.next_x])
-    rng, theta = RNG(0), begin(nmpc, **fault.model)
+    rng, theta = RNG(0), nmpc.problem.vector(**fault.model)
     for _ in range(20):
         state, action = rng.uniform(-3, 9, 3), rng.uniform(-0.6, 0.6, 2)
         foretold = model(state, action, theta, np.zeros(8)).full().ravel()
