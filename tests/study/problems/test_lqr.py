@@ -8,15 +8,18 @@ from nmpcrl.study.problems import gros_zanon as gz
 from nmpcrl.study.problems import lqr, peers
 
 STATE = np.array([0.7, -1.1])
-NMPC = Nmpc(lqr.problem(), solver=Riccati(1e-11))
-
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-def test_values_and_slopes_are_riccatis_and_the_worth_of_a_gain_is_what_it_costs():
+@pytest.fixture
+def nmpc() -> Nmpc:
+    return Nmpc(lqr.problem(), solver=Riccati(1e-11))  # of one test: its Python is forgotten
+
+
+def test_values_and_slopes_are_riccatis_and_the_worth_of_a_gain_is_what_it_costs(nmpc):
     theta = lqr.problem().theta + 0.02 * np.random.default_rng(1).normal(size=16)
     theta = lqr.problem().names.filled(theta, {"R": [[0.4]]})
-    solution, step = NMPC.solve(STATE, theta), 1e-6
+    solution, step = nmpc.solve(STATE, theta), 1e-6
 
     def truth(values):
         found = lqr.planned(values)
@@ -29,9 +32,9 @@ def test_values_and_slopes_are_riccatis_and_the_worth_of_a_gain_is_what_it_costs
     slopes = np.array([(up[0] - down[0]) / (2 * step) for up, down in sides])
     moves = np.array([(up[1] - down[1]) / (2 * step) for up, down in sides]).T
     np.testing.assert_allclose(solution.features, slopes, atol=1e-6)
-    np.testing.assert_allclose(NMPC.policy_jacobian(solution), moves, atol=1e-6)
+    np.testing.assert_allclose(nmpc.policy_jacobian(solution), moves, atol=1e-6)
     best, theta = lqr.optimal(), lqr.problem(informed=True).theta
-    solution = NMPC.solve(STATE, theta)
+    solution = nmpc.solve(STATE, theta)
     assert solution.value == pytest.approx(STATE @ best.P @ STATE, rel=1e-9)
     np.testing.assert_allclose(solution.action, -best.K @ STATE, atol=1e-8)
     best = lqr.optimal()
@@ -58,10 +61,10 @@ def shooting(plan, th):
     return objective
 
 
-def test_value_and_action_are_csnlps_and_the_agent_of_the_peer_meets_our_plant():
+def test_value_and_action_are_csnlps_and_the_agent_of_the_peer_meets_our_plant(nmpc):
     agent = peers.agent(lqr.problem(), shooting, "ipopt, 1e-10")
     for state in np.random.default_rng(3).normal(size=(5, 2)):
-        solution = NMPC.solve(state, lqr.problem().theta)
+        solution = nmpc.solve(state, lqr.problem().theta)
         with peers.silent():
             action, theirs = agent.state_value(state, True)
         assert float(theirs.f) == pytest.approx(solution.value, rel=1e-7)
