@@ -21,7 +21,7 @@ STATE = np.array([0.7, -1.1])
 pytestmark = pytest.mark.usefixtures("interpreted")
 
 
-@pytest.fixture(scope="module", params=[1, 6, 25])
+@pytest.fixture(params=[1, 6, 25])
 def linear(request) -> Problem:
     return Problem(
         states=2, inputs=2, horizon=request.param, gamma=GAMMA,
@@ -34,7 +34,7 @@ def linear(request) -> Problem:
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=SOLVERS)
+@pytest.fixture(params=SOLVERS)
 def nmpc(request, linear) -> Nmpc:
     return Nmpc(linear, solver=SOLVERS[request.param](tolerance=1e-10))
 
