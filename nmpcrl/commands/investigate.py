@@ -2,13 +2,15 @@
 
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from nmpcrl.commands.options import WORKERS
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from nmpcrl.studies.investigation import Investigation
 
 BOOK = {  # the investigations of the book beside the main study, in `nmpcrl.studies`
@@ -142,7 +144,7 @@ def _report(one: "Investigation", parts: tuple[str, ...]) -> None:
         click.echo(f"{part}: {rows - missing} of {rows} rows are stored{minutes * (missing > 0)}")
 
 
-def _say(one: "Investigation", table: Any) -> None:
+def _say(one: "Investigation", table: "pd.DataFrame") -> None:
     """The answer to each question, and the expected one where it differs."""
     from nmpcrl.studies.investigation import WORDS
 

@@ -19,7 +19,10 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.learners import time_learners_repeatedly
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import Measurement, measured
+from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import BITS, COLUMNS, FOLLOWED, Evidence, Published
+from nmpcrl.claims.rule import judge
+from nmpcrl.claims.verdict import UNDECIDABLE
 from nmpcrl.study import design, paper
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import Experiment, frozen_arm
@@ -129,10 +132,15 @@ def publish_searches(searches: Mapping[str, SearchResult]) -> Path:
 
 
 def publish_times(timings: pd.DataFrame) -> Path:
-    """Replace the published times by times of `time_learners` that were taken here.
+    """Replace the published times by those of `time_learners_repeatedly`, taken here.
 
-    Where the machine was busy, `publish_times(time_learners_repeatedly())` takes them once more.
+    Raises:
+        Unpublishable: they do not decide all claims about time, as of a busy machine.
     """
+    judged = judge(BY_TIME, timings=timings)
+    open_claims = ", ".join(one.claim for one in judged if one.outcome == UNDECIDABLE)
+    if open_claims:
+        raise Unpublishable(f"times that leave {open_claims} open: take them on an idle machine")
     return _written(published.TIMINGS, timings, made_here())
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from builders import scaled
+from builders import scaled, timings
 
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.search import SearchResult
@@ -30,7 +30,7 @@ RUNS = (
     Experiment("frozen", episodes=7, steps=9, evaluate_every=1),
 )
 LABELS = {e: "main" if e.horizon == paper.HORIZON else "N = 2" for e in RUNS}
-TIMES = pd.DataFrame({"solver": ["ipopt"], "learner": ["ES"], "ratio": [1 / 3]})
+TIMES = timings(0.65, width=0.02, waited=0.5, solvers=["ipopt"])
 SEARCHES = {"B": SearchResult((0.1, 1 / 3), 31, (1, 7), (1 / 3, 0.1))}
 AUDIT = Measurement(0.1, 2 / 3, 0.5)
 
@@ -169,3 +169,9 @@ def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
     )
     with pytest.raises(Unpublishable, match="is published already, in the part 'main'"):
         main_study.publish_runs(anew, main)
+
+
+def test_times_that_leave_a_claim_open_are_not_published(known):
+    with pytest.raises(Unpublishable, match="leave C3 open"):
+        main_study.publish_times(timings(0.65, width=0.07, waited=0.5, solvers=["ipopt"]))
+    pd.testing.assert_frame_equal(load().timings, known.timings)

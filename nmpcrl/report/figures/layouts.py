@@ -141,7 +141,7 @@ def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series, find
     """Where ES ends against where a gap closes, and how well each measure tells that beforehand.
 
     Args:
-        scores: of `predictors.predictor_scores`.
+        scores: of `difficulty.predictor_scores`.
         runs: of ES, of `rows.table`.
         closes: theta_c at which the first gap of the first trajectory closes, a run's layout each.
         finding: the title.
